@@ -1,0 +1,187 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <set>
+
+#include "series/recorded_test.hpp"
+#include "series/sample.hpp"
+
+namespace thermbal {
+namespace {
+
+struct Cell {
+    std::string text;
+    std::size_t line = 0;
+    std::size_t column = 0;
+};
+
+/// Splits RFC 4180 text into records, one call each. Quoted cells may hold commas, quotes and line ends.
+class CsvReader {
+  public:
+    explicit CsvReader(std::string_view text) : text_(text) {
+        if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);
+    }
+
+    bool at_end() const { return at_ >= text_.size(); }
+    bool at_comment() const { return !at_end() && text_[at_] == '#'; }
+
+    void skip_line() {
+        while (!at_end() && text_[at_] != '\n') ++at_;
+        take_line_end();
+    }
+
+    /// The cells of the next record; empty cells for an empty line; nullopt for an unclosed quote.
+    std::optional<std::vector<Cell>> next() {
+        std::vector<Cell> cells;
+        for (;;) {
+            Cell cell{{}, line_, at_ - line_start_ + 1};
+            if (!take_cell(cell.text)) return std::nullopt;
+            cells.push_back(std::move(cell));
+            if (!at_end() && text_[at_] == ',') {
+                ++at_;
+                continue;
+            }
+            take_line_end();
+            return cells;
+        }
+    }
+
+    std::size_t line() const { return line_; }
+
+  private:
+    bool take_cell(std::string& into) {
+        if (at_end() || text_[at_] != '"') {
+            while (!at_end() && text_[at_] != ',' && text_[at_] != '\n' && text_[at_] != '\r') into += text_[at_++];
+            return true;
+        }
+        for (++at_; !at_end(); ++at_) {
+            if (text_[at_] == '"') {
+                if (at_ + 1 >= text_.size() || text_[at_ + 1] != '"') {
+                    ++at_;
+                    return true;
+                }
+                ++at_;
+            }
+            if (text_[at_] == '\n') ++line_;
+            into += text_[at_];
+        }
+        return false;
+    }
+
+    void take_line_end() {
+        if (!at_end() && text_[at_] == '\r') ++at_;
+        if (!at_end() && text_[at_] == '\n') ++at_;
+        ++line_;
+        line_start_ = at_;
+    }
+
+    std::string_view text_;
+    std::size_t at_ = 0;
+    std::size_t line_ = 1;
+    std::size_t line_start_ = 0;
+};
+
+bool is_channel_name(std::string_view name) {
+    return name.size() >= 2 && name.size() <= 6 && name[0] == 'T' &&
+           std::ranges::all_of(name.substr(1), [](char c) { return c >= '0' && c <= '9'; });
+}
+
+/// A finite number, or NaN for an empty cell; nullopt for anything else.
+std::optional<double> parse_cell(std::string_view text) {
+    while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+    while (!text.empty() && (text.back() == ' ' || text.back() == '\t')) text.remove_suffix(1);
+    if (text.empty()) return no_value;
+    double value = 0.0;
+    const auto [end, code] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (code != std::errc{} || end != text.data() + text.size() || !std::isfinite(value)) return std::nullopt;
+    return value;
+}
+
+std::unexpected<Error> refuse(std::string_view name, std::size_t line, std::size_t column, std::string_view what) {
+    return fail(NextStep::refuse_input, fmt::format("{}:{}:{}: {}", name, line, column, what));
+}
+
+}  // namespace
+
+Result<RecordedTest> parse_recorded_test(std::string_view csv_text, std::string_view name) {
+    CsvReader reader(csv_text);
+    while (reader.at_comment()) reader.skip_line();
+    if (reader.at_end()) return refuse(name, reader.line(), 1, "no header found; expected time_s,T1,...");
+    const auto header = reader.next();
+    if (!header) return refuse(name, reader.line(), 1, "a quoted cell is not closed");
+    if (header->front().text != "time_s") {
+        return refuse(name, header->front().line, 1,
+                      fmt::format("first column is '{}', expected time_s", header->front().text));
+    }
+
+    RecordedTest test;
+    std::set<std::string> seen;
+    std::vector<std::pair<bool, std::size_t>> target;  // (is a channel, index among its kind) of columns 1, 2, ...
+    for (std::size_t i = 1; i < header->size(); ++i) {
+        const Cell& cell = (*header)[i];
+        if (cell.text.empty()) return refuse(name, cell.line, cell.column, "a column has no name");
+        if (!seen.insert(cell.text).second) {
+            return refuse(name, cell.line, cell.column, fmt::format("column '{}' stands twice", cell.text));
+        }
+        auto& columns = is_channel_name(cell.text) ? test.channels : test.inputs;
+        target.emplace_back(&columns == &test.channels, columns.size());
+        columns.push_back({cell.text, {}});
+    }
+
+    while (!reader.at_end()) {
+        const auto record = reader.next();
+        if (!record) return refuse(name, reader.line(), 1, "a quoted cell is not closed");
+        const Cell& first = record->front();
+        if (record->size() == 1 && first.text.empty()) continue;  // an empty line
+        if (record->size() != header->size()) {
+            return refuse(name, first.line, 1,
+                          fmt::format("{} cells, the header has {}", record->size(), header->size()));
+        }
+        const auto time_s = parse_cell(first.text);
+        if (!time_s || std::isnan(*time_s)) {
+            return refuse(name, first.line, 1, fmt::format("time_s is '{}', expected a number", first.text));
+        }
+        if (!test.time_s.empty() && *time_s <= test.time_s.back()) {
+            return refuse(name, first.line, 1,
+                          fmt::format("time_s is {} after {}, expected strictly increasing times", *time_s,
+                                      test.time_s.back()));
+        }
+        test.time_s.push_back(*time_s);
+        for (std::size_t i = 1; i < record->size(); ++i) {
+            const Cell& cell = (*record)[i];
+            const auto value = parse_cell(cell.text);
+            if (!value) {
+                return refuse(name, cell.line, cell.column,
+                              fmt::format("{} is '{}', expected a number or an empty cell", (*header)[i].text,
+                                          cell.text));
+            }
+            const auto [is_channel, index] = target[i - 1];
+            (is_channel ? test.channels : test.inputs)[index].values.push_back(*value);
+        }
+    }
+    if (test.time_s.empty()) return refuse(name, reader.line(), 1, "the header is there, no row follows it");
+    return test;
+}
+
+std::string format_recorded_test(const RecordedTest& test) {
+    std::string text = "time_s";
+    for (const Column& column : test.channels) text += "," + column.name;
+    for (const Column& column : test.inputs) text += "," + column.name;
+    text += "\r\n";
+    const auto add = [&](const Column& column, std::size_t row) {
+        text += ',';
+        if (std::isfinite(column.values[row])) text += fmt::format("{}", column.values[row]);
+    };
+    for (std::size_t row = 0; row < test.time_s.size(); ++row) {
+        text += fmt::format("{}", test.time_s[row]);
+        for (const Column& column : test.channels) add(column, row);
+        for (const Column& column : test.inputs) add(column, row);
+        text += "\r\n";
+    }
+    return text;
+}
+
+}  // namespace thermbal

@@ -1,0 +1,37 @@
+#include "series/sample.hpp"
+
+#include <array>
+#include <utility>
+
+namespace thermbal {
+namespace {
+
+constexpr std::array<std::pair<Quality, std::string_view>, 9> quality_names{{
+    {Quality::good, "good"},
+    {Quality::open, "open"},
+    {Quality::shorted, "short"},
+    {Quality::over_range, "over_range"},
+    {Quality::under_range, "under_range"},
+    {Quality::stuck, "stuck"},
+    {Quality::stale, "stale"},
+    {Quality::communication, "communication"},
+    {Quality::gap, "gap"},
+}};
+
+}  // namespace
+
+std::string_view to_string(Quality quality) {
+    for (const auto& [value, name] : quality_names) {
+        if (value == quality) return name;
+    }
+    return "gap";
+}
+
+std::optional<Quality> quality_from_string(std::string_view name) {
+    for (const auto& [value, known] : quality_names) {
+        if (known == name) return value;
+    }
+    return std::nullopt;
+}
+
+}  // namespace thermbal

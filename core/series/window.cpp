@@ -1,0 +1,93 @@
+#include <algorithm>
+#include <cmath>
+
+#include "series/recorded_test.hpp"
+#include "series/sample.hpp"
+
+namespace thermbal {
+namespace {
+
+const Column* find_column(const std::vector<Column>& columns, std::string_view name) {
+    const auto found = std::ranges::find(columns, name, &Column::name);
+    return found == columns.end() ? nullptr : &*found;
+}
+
+TestWindow slice(const TestWindow& window, std::size_t first, std::size_t count) {
+    TestWindow part{window.time_s(first), window.period_s, count, {}, {}};
+    const auto cut = [&](const Column& column) {
+        const auto from = column.values.begin() + static_cast<std::ptrdiff_t>(first);
+        return Column{column.name, {from, from + static_cast<std::ptrdiff_t>(count)}};
+    };
+    for (const Column& column : window.channels) part.channels.push_back(cut(column));
+    for (const Column& column : window.inputs) part.inputs.push_back(cut(column));
+    return part;
+}
+
+/// Times on the grid come out of a product; a scan exactly at the limit must not be lost to rounding.
+constexpr double grid_slack = 1e-6;
+
+}  // namespace
+
+const Column* TestWindow::channel(std::string_view channel_name) const {
+    return find_column(channels, channel_name);
+}
+
+const Column* TestWindow::input(std::string_view input_name) const { return find_column(inputs, input_name); }
+
+double median_step_s(const RecordedTest& test) {
+    if (test.time_s.size() < 2) return 0.0;
+    std::vector<double> steps;
+    steps.reserve(test.time_s.size() - 1);
+    for (std::size_t i = 1; i < test.time_s.size(); ++i) steps.push_back(test.time_s[i] - test.time_s[i - 1]);
+    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::ranges::nth_element(steps, middle);
+    return *middle;
+}
+
+TestWindow to_window(const RecordedTest& test, double period_s) {
+    TestWindow window;
+    window.period_s = period_s;
+    if (test.time_s.empty()) return window;
+    window.start_s = test.time_s.front();
+    const auto scan_of = [&](std::size_t row) {
+        return static_cast<std::size_t>(std::llround((test.time_s[row] - window.start_s) / period_s));
+    };
+    window.scans = scan_of(test.time_s.size() - 1) + 1;
+    for (const Column& column : test.channels) {
+        Column on_grid{column.name, std::vector<double>(window.scans, no_value)};
+        std::vector<int> rows(window.scans, 0);
+        for (std::size_t row = 0; row < column.values.size(); ++row) {
+            if (!std::isfinite(column.values[row])) continue;
+            double& value = on_grid.values[scan_of(row)];
+            int& count = rows[scan_of(row)];
+            value = count == 0 ? column.values[row] : (value * count + column.values[row]) / (count + 1);
+            ++count;
+        }
+        window.channels.push_back(std::move(on_grid));
+    }
+    for (const Column& column : test.inputs) {
+        Column on_grid{column.name, std::vector<double>(window.scans, no_value)};
+        for (std::size_t row = 0; row < column.values.size(); ++row) {
+            if (std::isfinite(column.values[row])) on_grid.values[scan_of(row)] = column.values[row];
+        }
+        for (std::size_t scan = 1; scan < window.scans; ++scan) {
+            if (!std::isfinite(on_grid.values[scan])) on_grid.values[scan] = on_grid.values[scan - 1];
+        }
+        window.inputs.push_back(std::move(on_grid));
+    }
+    return window;
+}
+
+TestWindow window_until(const TestWindow& window, double until_s) {
+    const double scans = std::floor((until_s - window.start_s) / window.period_s + grid_slack) + 1.0;
+    const auto count = static_cast<std::size_t>(std::clamp(scans, 0.0, static_cast<double>(window.scans)));
+    return slice(window, 0, count);
+}
+
+TestWindow window_from(const TestWindow& window, double from_s) {
+    const double skipped = std::ceil((from_s - window.start_s) / window.period_s - grid_slack);
+    const auto first = static_cast<std::size_t>(std::clamp(skipped, 0.0, static_cast<double>(window.scans)));
+    return slice(window, first, window.scans - first);
+}
+
+}  // namespace thermbal
