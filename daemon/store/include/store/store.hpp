@@ -1,0 +1,92 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/error.hpp"
+#include "store/reader.hpp"
+#include "store/records.hpp"
+
+namespace thermbal {
+
+/// A test that was open when the daemon ended, with everything it needs to go on.
+struct ResumedTest {
+    StoredTest test;
+    std::vector<ScanRecord> scans;
+    std::vector<DeclarationRecord> declarations;
+    std::vector<IdentificationRecord> identifications;  ///< the newest of each channel
+};
+
+struct StoreOptions {
+    int busy_timeout_ms = 2000;     ///< how long a call waits for another program's lock before `retry`
+    bool set_aside_damaged = true;  ///< a damaged file is renamed and a new one begun; otherwise `stop`
+};
+
+/// The one writing connection of a database: WAL, synchronous = FULL. Every call that writes is one
+/// transaction and returns after it is on the disk. One thread at a time.
+///
+/// Errors: `retry` when nothing was written and the same call may succeed later (locked, full, I/O error,
+/// read only); `refuse_input` when what was given contradicts what is stored; `stop` when the database is
+/// damaged. After any error nothing of the call is in the database.
+class Store {
+  public:
+    /// Opens or creates the database, brings an older one to this version, and holds it: a second Store on
+    /// the same file, in any process, is refused and told who has it.
+    static Result<Store> open(const std::filesystem::path& path, Moment now,
+                              const StoreOptions& options = {});
+
+    /// Where the damaged database that was found went, if one was.
+    const std::optional<std::filesystem::path>& set_aside() const;
+
+    /// All queries, on this connection.
+    const Reader& read() const;
+
+    /// Refused while another test is open.
+    Result<TestId> begin_test(const TestRecord& test);
+
+    /// Acknowledged means on the disk. `scan` must be above the last one stored. The very scan that is
+    /// already there (same times and status: a repetition after a doubtful error) is acknowledged again, not
+    /// stored twice.
+    Result<void> append_scan(TestId id, const ScanRecord& scan);
+    /// Several scans, all or none: those kept in memory while the disk was away, or the missed ones after a
+    /// restart.
+    Result<void> append_scans(TestId id, std::span<const ScanRecord> scans);
+
+    /// One declaration a channel: a second one for the same channel is refused.
+    Result<void> record_declaration(TestId id, const DeclarationRecord& declaration);
+    /// Of all channels of one window at once. The same channel and window again replaces what was said.
+    Result<void> record_identifications(TestId id, std::span<const IdentificationRecord> identifications);
+    /// Returns the event's id.
+    Result<std::int64_t> record_event(const EventRecord& event);
+    Result<std::int64_t> record_archive(const ArchiveRecord& archive);
+
+    /// Moves a test on, as TestState allows; `reason` is kept for stopped and aborted. When it ends, the WAL
+    /// is truncated, so that the file alone holds the test.
+    Result<void> set_state(TestId id, TestState state, Moment now, std::string_view reason);
+
+    /// The test that was open when the daemon ended, if there was one.
+    Result<std::optional<ResumedTest>> resume() const;
+
+    /// A passive checkpoint, for a quiet moment after a scan. Never waits for readers.
+    Result<void> checkpoint();
+    /// Size of the write-ahead log in bytes: a figure for `health`; a standing reader makes it grow.
+    std::uint64_t wal_bytes() const;
+    std::uint64_t database_bytes() const;
+
+    Store(Store&&) noexcept;
+    Store& operator=(Store&&) noexcept;
+    ~Store();
+
+  private:
+    struct Parts;
+    explicit Store(std::unique_ptr<Parts> parts);
+    std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace thermbal
