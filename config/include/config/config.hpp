@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "modbus/link.hpp"
+#include "modbus/profile.hpp"
+#include "serial/ports.hpp"
+
+namespace thermbal {
+
+/// The configuration of the daemon: plain data with the defaults of config/README.md. Every reference between
+/// tables (line of a unit, unit of a channel) is resolved to an index, every profile is loaded.
+struct TestConfig {
+    enum class Start : std::uint8_t { manual, automatic };
+    std::string name = "thermal balance";
+    std::string machine;
+    double period_s = 15.0;
+    std::optional<double> max_duration_min;  ///< abort a test that runs longer
+    bool keep_measuring = false;
+    Start start = Start::manual;
+};
+
+struct StoreConfig {
+    std::string path = "/var/lib/thermbal/thermbal.db";
+};
+
+struct ServiceConfig {
+    std::string socket = "/run/thermbal/thermbald.sock";
+    std::string operators_group;  ///< empty: only the daemon's user and root may change anything
+};
+
+struct LogConfig {
+    std::string level = "info";  ///< trace, debug, info, warning, error
+};
+
+struct LineConfig {
+    LinkOptions link;                 ///< link.name is the line's name; find_device is left to the daemon
+    std::optional<PortSelector> usb;  ///< rtu: instead of link.device
+};
+
+struct UnitConfig {
+    std::string name;
+    std::size_t line = 0;  ///< index into Config::lines
+    int unit_id = 1;
+    ModuleProfile profile;
+};
+
+struct ChannelConfig {
+    enum class Role : std::uint8_t { structure, ambient };
+    std::string name;
+    std::size_t unit = 0;  ///< index into Config::units
+    int input = 1;         ///< 1-based, as printed on the module
+    Role role = Role::structure;
+    std::string place;
+    bool required = true;   ///< the test ends only when it is declared; default false for the ambient
+    double offset_C = 0.0;  ///< added to the reading: the channel's calibration
+};
+
+/// Plain numbers; core's own option structs are filled from these by the daemon.
+struct IdentificationConfig {
+    double tolerance_C = 0.2;
+    int max_lag = 35;
+    double every_s = 120.0;
+    int workers = 2;
+};
+
+struct StopConfig {
+    enum class Action : std::uint8_t { none, command, write_coil, write_register };
+    Action action = Action::none;
+    std::vector<std::string> command;  ///< program and arguments, no shell
+    std::size_t line = 0;              ///< index into Config::lines
+    int unit_id = 1;
+    int address = 0;
+    int value = 1;
+    double timeout_s = 10.0;
+};
+
+struct Config {
+    TestConfig test;
+    StoreConfig store;
+    ServiceConfig service;
+    LogConfig log;
+    std::vector<LineConfig> lines;
+    std::vector<UnitConfig> units;
+    std::vector<ChannelConfig> channels;
+    IdentificationConfig identification;
+    StopConfig stop;
+
+    /// Index into channels; empty when no channel has the role ambient.
+    std::optional<std::size_t> ambient() const;
+};
+
+}  // namespace thermbal

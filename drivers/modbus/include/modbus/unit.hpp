@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "modbus/link.hpp"
+#include "modbus/profile.hpp"
+
+namespace thermbal {
+
+/// One read request: `count` registers from `first` on, which hold `inputs` inputs from `first_input`
+/// (0-based) on.
+struct BlockRead {
+    int first = 0;
+    int count = 0;
+    int first_input = 0;
+    int inputs = 0;
+};
+
+/// The fewest reads of at most 125 registers that cover the inputs; an input never straddles two reads.
+std::vector<BlockRead> plan_blocks(const ModuleProfile& profile);
+
+/// What is read of one unit at every scan. Plain data; make it once with plan_unit.
+struct UnitPlan {
+    int unit_id = 1;
+    ModuleProfile profile;
+    std::vector<BlockRead> blocks;
+};
+
+UnitPlan plan_unit(int unit_id, ModuleProfile profile);
+
+/// One unit at one scan: a sample an input, always profile.inputs of them. With an error (of the first block
+/// that failed) the inputs of the failed and the following blocks are Quality::communication without a raw
+/// register.
+struct UnitReading {
+    std::vector<Sample> samples;
+    std::optional<Error> error;
+    std::int64_t request_ns = 0;  ///< the clock before the first request
+    std::int64_t reply_ns = 0;    ///< the clock after the last reply, or after the failure
+};
+
+using ClockNs = std::function<std::int64_t()>;
+
+/// Reads a unit once. Takes at most plan.blocks.size() * longest_call_s of the link.
+UnitReading read_unit(Link& link, const UnitPlan& plan, const ClockNs& now_ns);
+
+}  // namespace thermbal
