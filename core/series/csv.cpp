@@ -1,10 +1,10 @@
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <optional>
 #include <set>
+
+#include <fmt/format.h>
 
 #include "series/recorded_test.hpp"
 #include "series/sample.hpp"
@@ -54,7 +54,8 @@ class CsvReader {
   private:
     bool take_cell(std::string& into) {
         if (at_end() || text_[at_] != '"') {
-            while (!at_end() && text_[at_] != ',' && text_[at_] != '\n' && text_[at_] != '\r') into += text_[at_++];
+            while (!at_end() && text_[at_] != ',' && text_[at_] != '\n' && text_[at_] != '\r')
+                into += text_[at_++];
             return true;
         }
         for (++at_; !at_end(); ++at_) {
@@ -100,7 +101,8 @@ std::optional<double> parse_cell(std::string_view text) {
     return value;
 }
 
-std::unexpected<Error> refuse(std::string_view name, std::size_t line, std::size_t column, std::string_view what) {
+std::unexpected<Error> refuse(std::string_view name, std::size_t line, std::size_t column,
+                              std::string_view what) {
     return fail(NextStep::refuse_input, fmt::format("{}:{}:{}: {}", name, line, column, what));
 }
 
@@ -119,7 +121,8 @@ Result<RecordedTest> parse_recorded_test(std::string_view csv_text, std::string_
 
     RecordedTest test;
     std::set<std::string> seen;
-    std::vector<std::pair<bool, std::size_t>> target;  // (is a channel, index among its kind) of columns 1, 2, ...
+    std::vector<std::pair<bool, std::size_t>>
+        target;  // (is a channel, index among its kind) of columns 1, 2, ...
     for (std::size_t i = 1; i < header->size(); ++i) {
         const Cell& cell = (*header)[i];
         if (cell.text.empty()) return refuse(name, cell.line, cell.column, "a column has no name");

@@ -32,7 +32,9 @@ const Column* TestWindow::channel(std::string_view channel_name) const {
     return find_column(channels, channel_name);
 }
 
-const Column* TestWindow::input(std::string_view input_name) const { return find_column(inputs, input_name); }
+const Column* TestWindow::input(std::string_view input_name) const {
+    return find_column(inputs, input_name);
+}
 
 double median_step_s(const RecordedTest& test) {
     if (test.time_s.size() < 2) return 0.0;

@@ -5,8 +5,9 @@
 
 namespace thermbal {
 
-/// Calls `body(i)` once for every i in [0, count), in any order, possibly on several threads, and returns when all are
-/// done. core has no threads of its own: whoever calls it says how work is spread. `body` must not throw.
+/// Calls `body(i)` once for every i in [0, count), in any order, possibly on several threads, and returns
+/// when all are done. core has no threads of its own: whoever calls it says how work is spread. `body` must
+/// not throw.
 using ParallelFor = std::function<void(std::size_t count, const std::function<void(std::size_t)>& body)>;
 
 /// Runs the bodies one after the other on the calling thread.

@@ -23,15 +23,17 @@ struct RecordedTest {
     std::vector<Column> inputs;
 };
 
-/// Reads the CSV form of INTERFACES: RFC 4180 with header, first column `time_s`, a channel is `T` and a number, any
-/// other column a known input, `#` lines before the header are comments, an empty cell is a missing sample.
-/// `name` stands in the messages (file name). Errors (refuse_input) carry line and column.
+/// Reads the CSV form of INTERFACES: RFC 4180 with header, first column `time_s`, a channel is `T` and a
+/// number, any other column a known input, `#` lines before the header are comments, an empty cell is a
+/// missing sample. `name` stands in the messages (file name). Errors (refuse_input) carry line and column.
 Result<RecordedTest> parse_recorded_test(std::string_view csv_text, std::string_view name);
 
-/// The inverse of parse_recorded_test: shortest digits that read back to the same double, NaN as an empty cell.
+/// The inverse of parse_recorded_test: shortest digits that read back to the same double, NaN as an empty
+/// cell.
 std::string format_recorded_test(const RecordedTest& test);
 
-/// A test on the uniform grid of its scans: row k is at start_s + k * period_s. What the identification works on.
+/// A test on the uniform grid of its scans: row k is at start_s + k * period_s. What the identification works
+/// on.
 struct TestWindow {
     double start_s = 0.0;
     double period_s = 15.0;
@@ -48,8 +50,8 @@ struct TestWindow {
 /// The scan period of a recording: the median step, in seconds; 0 with fewer than two rows.
 double median_step_s(const RecordedTest& test);
 
-/// Puts a recording on the grid of `period_s`, from its first row on: every row goes to the nearest scan, rows that
-/// share a scan are averaged, a scan without a row is NaN, an input holds its last value.
+/// Puts a recording on the grid of `period_s`, from its first row on: every row goes to the nearest scan,
+/// rows that share a scan are averaged, a scan without a row is NaN, an input holds its last value.
 TestWindow to_window(const RecordedTest& test, double period_s);
 
 /// The first scans of a window: those at times <= until_s.

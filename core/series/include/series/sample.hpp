@@ -27,8 +27,8 @@ std::optional<Quality> quality_from_string(std::string_view name);
 
 inline constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
 
-/// One channel at one scan. `raw` is the register as the module sent it (16 or 32 bits, sign not applied); empty when
-/// the module did not answer.
+/// One channel at one scan. `raw` is the register as the module sent it (16 or 32 bits, sign not applied);
+/// empty when the module did not answer.
 struct Sample {
     std::optional<std::uint32_t> raw;
     double value_C = no_value;

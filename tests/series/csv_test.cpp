@@ -1,0 +1,67 @@
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "series/recorded_test.hpp"
+
+namespace thermbal {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(Csv, ReadsChannelsInputsCommentsQuotesAndMissingSamples) {
+    const auto test = parse_recorded_test(
+        "# a comment, with \"quotes\n# "
+        "another\ntime_s,T1,\"T5\",spindle_rpm\r\n0,18.0,18.1,0\r\n15,,\"18.3\",5000\n",
+        "a.csv");
+    ASSERT_TRUE(test) << test.error().message;
+    EXPECT_THAT(test->time_s, testing::ElementsAre(0.0, 15.0));
+    ASSERT_EQ(test->channels.size(), 2U);
+    EXPECT_EQ(test->channels[1].name, "T5");
+    EXPECT_TRUE(std::isnan(test->channels[0].values[1]));
+    EXPECT_DOUBLE_EQ(test->channels[1].values[1], 18.3);
+    ASSERT_EQ(test->inputs.size(), 1U);
+    EXPECT_DOUBLE_EQ(test->inputs[0].values[1], 5000.0);
+}
+
+TEST(Csv, WhatIsWrittenReadsBackToTheSameDoubles) {
+    RecordedTest test{
+        {0.0, 15.000001, 30.1}, {{"T1", {18.1, std::nan(""), 0.1 + 0.2}}}, {{"spindle_rpm", {1, 2, 3}}}};
+    const auto again = parse_recorded_test(format_recorded_test(test), "again");
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(again->time_s, test.time_s);
+    EXPECT_EQ(again->channels[0].values[2], test.channels[0].values[2]);
+    EXPECT_TRUE(std::isnan(again->channels[0].values[1]));
+    EXPECT_EQ(again->inputs[0].values, test.inputs[0].values);
+}
+
+struct Refused {
+    const char* text;
+    const char* message;
+};
+
+class CsvRefused : public testing::TestWithParam<Refused> {};
+
+TEST_P(CsvRefused, SaysFileLineColumnAndWhatWasFound) {
+    const auto test = parse_recorded_test(GetParam().text, "bad.csv");
+    ASSERT_FALSE(test);
+    EXPECT_EQ(test.error().next, NextStep::refuse_input);
+    EXPECT_THAT(test.error().message, HasSubstr(GetParam().message));
+}
+
+INSTANTIATE_TEST_SUITE_P(Csv, CsvRefused,
+                         testing::Values(Refused{"", "bad.csv:1:1: no header"},
+                                         Refused{"t,T1\n0,1\n", "first column is 't'"},
+                                         Refused{"time_s,T1\n", "no row follows"},
+                                         Refused{"time_s,T1,T1\n0,1,2\n", "'T1' stands twice"},
+                                         Refused{"time_s,T1\n0,1\n0,2\n", "bad.csv:3:1: time_s is 0 after 0"},
+                                         Refused{"time_s,T1\n0,1\n15,abc\n", "bad.csv:3:4: T1 is 'abc'"},
+                                         Refused{"time_s,T1\n0,1,2\n", "3 cells, the header has 2"},
+                                         Refused{"time_s,T1\n0,inf\n", "T1 is 'inf'"},
+                                         Refused{"time_s,T1\n\"0,1\n", "not closed"},
+                                         Refused{"time_s,\n0,1\n", "a column has no name"},
+                                         Refused{"time_s,T1\n,1\n", "time_s is ''"}));
+
+}  // namespace
+}  // namespace thermbal

@@ -1,0 +1,54 @@
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "series/recorded_test.hpp"
+#include "series/sample.hpp"
+
+namespace thermbal {
+namespace {
+
+using testing::DoubleEq;
+using testing::ElementsAre;
+using testing::NanSensitiveDoubleEq;
+
+TEST(Window, RowsGoToTheirScanAndWhatIsNotThereStaysMissing) {
+    const RecordedTest test{
+        {0.0, 15.2, 44.9, 45.1}, {{"T1", {1.0, 2.0, 4.0, 6.0}}}, {{"spindle_rpm", {0, 5000, 5000, 0}}}};
+    const TestWindow window = to_window(test, 15.0);
+    EXPECT_EQ(window.scans, 4U);
+    EXPECT_THAT(window.channels[0].values,
+                ElementsAre(DoubleEq(1.0), DoubleEq(2.0), NanSensitiveDoubleEq(no_value), DoubleEq(5.0)));
+    EXPECT_THAT(window.inputs[0].values, ElementsAre(0.0, 5000.0, 5000.0, 0.0));
+}
+
+TEST(Window, UntilAndFromKeepTheScanAtTheLimit) {
+    RecordedTest test;
+    test.channels.push_back({"T2", {}});
+    for (int k = 0; k < 100; ++k) {
+        test.time_s.push_back(k * 0.1);
+        test.channels[0].values.push_back(k);
+    }
+    const TestWindow window = to_window(test, median_step_s(test));
+    for (int k = 0; k < 100; ++k) {
+        EXPECT_EQ(window_until(window, k * 0.1).scans, static_cast<std::size_t>(k + 1));
+        const TestWindow rest = window_from(window, k * 0.1);
+        ASSERT_EQ(rest.scans, static_cast<std::size_t>(100 - k));
+        EXPECT_EQ(rest.channels[0].values.front(), k);
+        EXPECT_NEAR(rest.start_s, k * 0.1, 1e-12);
+    }
+    EXPECT_EQ(window_until(window, -1.0).scans, 0U);
+    EXPECT_EQ(window_from(window, 1e9).scans, 0U);
+}
+
+TEST(Quality, NamesReadBack) {
+    for (int i = 0; i <= static_cast<int>(Quality::gap); ++i) {
+        const auto quality = static_cast<Quality>(i);
+        EXPECT_EQ(quality_from_string(to_string(quality)), quality);
+    }
+    EXPECT_FALSE(quality_from_string("fine"));
+}
+
+}  // namespace
+}  // namespace thermbal
