@@ -79,6 +79,30 @@ double overall_noise_sd_C(const std::vector<Deviation>& deviations, double small
     return sizes.empty() ? smallest_C : std::max(smallest_C, sd_per_mad * median_of(sizes));
 }
 
+/// The newest finite sample before `end`, or 0.
+std::size_t last_finite(std::span<const double> values, std::size_t end) {
+    while (end > 1 && std::isnan(values[end - 1])) --end;
+    return end == 0 ? 0 : end - 1;
+}
+
+/// A spike jumps away and back; beside the edge of a step, the next sample is like it.
+bool jumps(double outside_C, double inside_C, const Deviation& inside) {
+    return std::isnan(outside_C) || std::abs(outside_C - inside_C) > 0.5 * std::abs(inside.from_line_C);
+}
+
+void mark(std::size_t from, std::size_t end, bool newest, MarkedWindow& window) {
+    for (std::size_t k = from; k < end; ++k) {
+        double& value = window.values_C[k];
+        if (std::isnan(value)) continue;
+        value = std::numeric_limits<double>::quiet_NaN();
+        if (newest) {
+            ++window.undecided;
+        } else {
+            window.spikes.push_back(k);
+        }
+    }
+}
+
 }  // namespace
 
 Result<void> OutlierOptions::check() const {
@@ -119,18 +143,12 @@ Result<MarkedWindow> mark_outliers(std::span<const double> temperature_C, const 
         if (!stands_off(k)) continue;
         std::size_t end = k;
         while (end < samples && (stands_off(end) || std::isnan(temperature_C[end]))) ++end;
+        const std::size_t last = last_finite(temperature_C, end);
+        const bool leaves =
+            k == 0 || jumps(temperature_C[last_finite(temperature_C, k)], temperature_C[k], deviations[k]);
         const bool newest = end == samples;
-        if (end - k <= options.longest_spike) {
-            for (std::size_t i = k; i < end; ++i) {
-                if (std::isnan(temperature_C[i])) continue;
-                window.values_C[i] = std::numeric_limits<double>::quiet_NaN();
-                if (newest) {
-                    ++window.undecided;
-                } else {
-                    window.spikes.push_back(i);
-                }
-            }
-        }
+        const bool returns = newest || jumps(temperature_C[end], temperature_C[last], deviations[last]);
+        if (end - k <= options.longest_spike && leaves && returns) mark(k, end, newest, window);
         k = end;
     }
     return window;
