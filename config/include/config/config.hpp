@@ -45,6 +45,7 @@ struct UnitConfig {
     std::string name;
     std::size_t line = 0;  ///< index into Config::lines
     int unit_id = 1;
+    std::string profile_name;  ///< as the configuration names it: a name or a path
     ModuleProfile profile;
 };
 

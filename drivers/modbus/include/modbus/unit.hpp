@@ -43,7 +43,11 @@ struct UnitReading {
 
 using ClockNs = std::function<std::int64_t()>;
 
-/// Reads a unit once. Takes at most plan.blocks.size() * longest_call_s of the link.
+/// No read_unit takes longer than this, whatever the other side does.
+double longest_unit_s(const LinkOptions& options, const UnitPlan& plan);
+
+/// Reads a unit once: at most longest_unit_s. A clean failure in the middle ends it: the rest is not asked
+/// for.
 UnitReading read_unit(Link& link, const UnitPlan& plan, const ClockNs& now_ns);
 
 }  // namespace thermbal

@@ -1,0 +1,122 @@
+#include <algorithm>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "config/load.hpp"
+#include "toml_reader.hpp"
+
+namespace thermbal {
+namespace {
+
+std::string explain_test(const TestConfig& test) {
+    const std::string limit = test.max_duration_min
+                                  ? fmt::format("max_duration_min = {}\n", *test.max_duration_min)
+                                  : std::string();
+    return fmt::format(
+        "[test]\nname = {}\nmachine = {}\nperiod_s = {}\n{}keep_measuring = {}\nstart = \"{}\"\n",
+        quoted(test.name), quoted(test.machine), test.period_s, limit, test.keep_measuring,
+        test.start == TestConfig::Start::manual ? "manual" : "auto");
+}
+
+std::string explain_serial(const LineConfig& line) {
+    std::string text;
+    if (line.usb) {
+        const PortSelector& usb = *line.usb;
+        std::vector<std::string> parts;
+        if (usb.usb_vid && usb.usb_pid) {
+            parts.push_back(fmt::format("vid_pid = \"{:04x}:{:04x}\"", *usb.usb_vid, *usb.usb_pid));
+        }
+        if (!usb.serial.empty()) parts.push_back("serial = " + quoted(usb.serial));
+        text += fmt::format("usb = {{ {} }}\n", fmt::join(parts, ", "));
+    } else {
+        text += fmt::format("device = {}\n", quoted(line.link.device));
+    }
+    const std::string_view parity = line.link.parity == 'N'   ? "none"
+                                    : line.link.parity == 'E' ? "even"
+                                                              : "odd";
+    return text + fmt::format("baud = {}\nparity = \"{}\"\ndata_bits = {}\nstop_bits = {}\n", line.link.baud,
+                              parity, line.link.data_bits, line.link.stop_bits);
+}
+
+std::string explain_line(const LineConfig& line) {
+    const LinkOptions& link = line.link;
+    std::string text = fmt::format("\n[[line]]\nname = {}\n", quoted(link.name));
+    if (link.transport == Transport::rtu) {
+        text += "transport = \"rtu\"\n" + explain_serial(line);
+    } else {
+        text += fmt::format("transport = \"{}\"\nhost = {}\nport = {}\nconnect_timeout_ms = {}\n",
+                            link.transport == Transport::tcp ? "tcp" : "rtu_over_tcp", quoted(link.host),
+                            link.port, link.connect_timeout_s * 1000.0);
+    }
+    return text + fmt::format("response_timeout_ms = {}\nquiet_ms = {}\n", link.response_timeout_s * 1000.0,
+                              link.quiet_s * 1000.0);
+}
+
+std::string as_comment(const std::string& text) {
+    std::string comment = "# ";
+    for (const char c : text) comment += c == '\n' ? std::string("\n# ") : std::string(1, c);
+    comment.resize(comment.size() - 2);
+    return comment;
+}
+
+std::string explain_unit(const Config& config, const UnitConfig& unit) {
+    return fmt::format("\n[[unit]]\nname = {}\nline = {}\nunit_id = {}\nprofile = {}\n{}", quoted(unit.name),
+                       quoted(config.lines[unit.line].link.name), unit.unit_id, quoted(unit.profile_name),
+                       as_comment(explain_profile(unit.profile)));
+}
+
+std::string explain_channel(const Config& config, const ChannelConfig& channel) {
+    return fmt::format(
+        "\n[[channel]]\nname = {}\nunit = {}\ninput = {}\nrole = \"{}\"\nplace = {}\nrequired = {}\noffset_C "
+        "= {}\n",
+        quoted(channel.name), quoted(config.units[channel.unit].name), channel.input,
+        channel.role == ChannelConfig::Role::ambient ? "ambient" : "structure", quoted(channel.place),
+        channel.required, channel.offset_C);
+}
+
+std::string explain_stop(const Config& config) {
+    const StopConfig& stop = config.stop;
+    std::string text = "\n[stop]\n";
+    switch (stop.action) {
+        case StopConfig::Action::none:
+            text += "action = \"none\"\n";
+            break;
+        case StopConfig::Action::command: {
+            std::vector<std::string> words(stop.command.size());
+            std::ranges::transform(stop.command, words.begin(), quoted);
+            text += fmt::format("action = \"command\"\ncommand = [{}]\n", fmt::join(words, ", "));
+            break;
+        }
+        case StopConfig::Action::write_coil:
+        case StopConfig::Action::write_register:
+            text += fmt::format(
+                "action = \"{}\"\nline = {}\nunit_id = {}\naddress = {}\nvalue = {}\n",
+                stop.action == StopConfig::Action::write_coil ? "write_coil" : "write_register",
+                quoted(config.lines[stop.line].link.name), stop.unit_id, stop.address, stop.value);
+            break;
+    }
+    return text + fmt::format("timeout_s = {}\n", stop.timeout_s);
+}
+
+}  // namespace
+
+std::string explain_config(const Config& config) {
+    const IdentificationConfig& identification = config.identification;
+    std::string text = explain_test(config.test);
+    text += fmt::format("\n[store]\npath = {}\n", quoted(config.store.path));
+    text += fmt::format("\n[service]\nsocket = {}\noperators_group = {}\n", quoted(config.service.socket),
+                        quoted(config.service.operators_group));
+    text += fmt::format("\n[log]\nlevel = {}\n", quoted(config.log.level));
+    text += fmt::format("\n[identification]\ntolerance_C = {}\nmax_lag = {}\nevery_s = {}\nworkers = {}\n",
+                        identification.tolerance_C, identification.max_lag, identification.every_s,
+                        identification.workers);
+    text += explain_stop(config);
+    for (const LineConfig& line : config.lines) text += explain_line(line);
+    for (const UnitConfig& unit : config.units) text += explain_unit(config, unit);
+    for (const ChannelConfig& channel : config.channels) text += explain_channel(config, channel);
+    return text;
+}
+
+}  // namespace thermbal
