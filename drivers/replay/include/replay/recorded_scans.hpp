@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "base/error.hpp"
+#include "series/recorded_test.hpp"
+
+namespace thermbal {
+
+/// A recorded test as a source of scans: what its channels read at any time. Nothing is interpolated: a time
+/// gets the row that was the newest then.
+class RecordedScans {
+  public:
+    /// Reads a CSV file in the form of INTERFACES. Errors (refuse_input) name the file, line and column.
+    static Result<RecordedScans> load(const std::string& path);
+    /// Errors (refuse_input): a recording without rows or without channels.
+    static Result<RecordedScans> from(RecordedTest test, const std::string& name);
+
+    /// One value a channel of the recording, in its order, C; NaN where that row has no sample. A time before
+    /// the first row gets the first row, one after the last row the last.
+    std::vector<double> at(double time_s) const;
+    /// Row `scan` of the recording; the last one for any later scan.
+    std::vector<double> row(std::size_t scan) const;
+
+    std::size_t scans() const { return test_.time_s.size(); }
+    double end_s() const { return test_.time_s.back(); }
+    std::vector<std::string> channels() const;
+    const RecordedTest& test() const { return test_; }
+
+  private:
+    explicit RecordedScans(RecordedTest test) : test_(std::move(test)) {}
+
+    RecordedTest test_;
+};
+
+}  // namespace thermbal

@@ -1,0 +1,34 @@
+#include "simulator/sim_clock.hpp"
+
+#include <algorithm>
+
+#include <time.h>
+
+namespace thermbal {
+
+std::int64_t monotonic_ns() {
+    timespec now{};
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+SimClock SimClock::scaled(double factor, std::int64_t epoch_ns) {
+    SimClock clock;
+    clock.factor_ = factor;
+    clock.epoch_ns_ = epoch_ns;
+    return clock;
+}
+
+SimClock SimClock::lockstep(double period_s) {
+    SimClock clock;
+    clock.period_s_ = period_s;
+    return clock;
+}
+
+double SimClock::time_of_request_s(std::int64_t now_ns, bool begins_scan) {
+    if (period_s_ <= 0.0) return std::max(0.0, static_cast<double>(now_ns - epoch_ns_) * 1e-9 * factor_);
+    if (begins_scan) ++scans_;
+    return scans_ == 0 ? 0.0 : static_cast<double>(scans_ - 1) * period_s_;
+}
+
+}  // namespace thermbal
