@@ -28,7 +28,7 @@ struct DenoiseOptions {
     std::size_t oldest_span = 20;
     std::size_t oldest_degree = 2;
     /// Detail levels that are thresholded; fewer on short windows (2^levels <= samples / 6).
-    std::size_t levels = 5;
+    std::size_t levels = 4;
     /// The step of the module's rounding, C. The noise is never taken for less than resolution_C / sqrt(12).
     double resolution_C = 0.0;
 
