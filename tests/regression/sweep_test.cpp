@@ -57,13 +57,13 @@ TEST(Sweep, PredictGivesTheSweepsOwnModel) {
     const auto swept = sweep(window, quick(), sequential_for);
     ASSERT_TRUE(swept);
     const LagFit& chosen = swept->by_lag[3];
-    const auto prediction = predict(window, chosen.n, chosen.C, chosen.sigma, 900, quick());
+    const auto prediction = predict(window, chosen.n, chosen.C, chosen.sigma, 3000, quick());
     ASSERT_TRUE(prediction);
     LagFit same = prediction->fit;
     same.cv_rmse_C = chosen.cv_rmse_C;
     EXPECT_TRUE(same_bits(same, chosen));
     ASSERT_EQ(prediction->window_C.size(), window.size());
-    ASSERT_EQ(prediction->predicted_C.size(), 900u);
+    ASSERT_EQ(prediction->predicted_C.size(), 3000u);
     EXPECT_EQ(prediction->window_C[3], window[3]);
     double sum = 0.0;
     for (std::size_t k = chosen.n; k < window.size(); ++k)
@@ -71,7 +71,9 @@ TEST(Sweep, PredictGivesTheSweepsOwnModel) {
     const double samples = static_cast<double>(window.size() - chosen.n);
     EXPECT_NEAR(std::sqrt(sum / (samples - 1.0)), chosen.window_rmse_C, 1e-12);
     ASSERT_TRUE(chosen.settles);
+    ASSERT_LT(chosen.settled_after, 3000u);
     EXPECT_NEAR(prediction->predicted_C[chosen.settled_after], chosen.steady_state_C, 0.005);
+    EXPECT_NEAR(prediction->predicted_C.back(), chosen.steady_state_C, 0.005);
 }
 
 TEST(Sweep, ALinearAutoregressionSettlesWhereItsEquationSays) {
