@@ -44,7 +44,8 @@ struct SocketServerOptions {
     std::size_t max_clients_per_user = 24;  ///< root and the daemon's own user are exempt
     std::size_t max_request_bytes =
         64 * 1024;  ///< one line; a longer one is answered with an error and closed
-    std::size_t max_reply_bytes = 16 * 1024 * 1024;
+    std::size_t max_reply_bytes = 8 * 1024 * 1024;
+    std::size_t max_pending_bytes = 64 * 1024 * 1024;  ///< unread replies of all clients together
     std::size_t max_backlog_bytes = 1024 * 1024;  ///< unread notifications at which a subscriber is dropped
 };
 

@@ -1,0 +1,124 @@
+#include "database_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <ctime>
+#include <fstream>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "sqlite.hpp"
+
+namespace thermbal {
+
+namespace {
+
+std::string reason(int code) {
+    return std::generic_category().message(code);
+}
+
+std::string holder(int fd) {
+    std::array<char, 32> text{};
+    const auto length = pread(fd, text.data(), text.size() - 1, 0);
+    std::string pid(text.data(), length > 0 ? static_cast<std::size_t>(length) : 0);
+    while (!pid.empty() && pid.back() == '\n') pid.pop_back();
+    return pid.empty() ? "another process" : "process " + pid;
+}
+
+void sync_folder(const std::filesystem::path& file) {
+    const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+    const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0) return;
+    fsync(fd);
+    close(fd);
+}
+
+}  // namespace
+
+Result<WriterLock> WriterLock::take(const std::filesystem::path& database) {
+    const auto path = database.string() + ".lock";
+    WriterLock lock(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0640));
+    if (lock.fd_ < 0)
+        return fail(
+            NextStep::refuse_input,
+            fmt::format("database {}: cannot open its lock {}: {}; the folder must exist and be writable",
+                        database.string(), path, reason(errno)));
+    if (flock(lock.fd_, LOCK_EX | LOCK_NB) != 0)
+        return fail(NextStep::refuse_input,
+                    fmt::format("database {}: {} is writing it already; stop that one, or name another file",
+                                database.string(), holder(lock.fd_)));
+    // The pid is for the message above only; the lock itself does not depend on it.
+    const auto pid = fmt::format("{}\n", getpid());
+    if (ftruncate(lock.fd_, 0) == 0 && pwrite(lock.fd_, pid.data(), pid.size(), 0) < 0) errno = 0;
+    return lock;
+}
+
+WriterLock::WriterLock(WriterLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+
+WriterLock::~WriterLock() {
+    if (fd_ >= 0) close(fd_);
+}
+
+Result<void> create_if_absent(const std::filesystem::path& database) {
+    const int fd = ::open(database.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0640);
+    if (fd < 0)
+        return fail(NextStep::refuse_input,
+                    fmt::format("database {}: {}; the folder must exist and both must be writable",
+                                database.string(), reason(errno)));
+    close(fd);
+    sync_folder(database);
+    return {};
+}
+
+Result<bool> is_damaged(const std::filesystem::path& database, int busy_timeout_ms) {
+    std::array<char, 16> header{};
+    std::ifstream file(database, std::ios::binary);
+    file.read(header.data(), header.size());
+    if (file.gcount() == 0) return false;
+    const bool zeroed = std::all_of(header.begin(), header.end(), [](char c) { return c == 0; });
+    if (zeroed) return true;
+    if (std::memcmp(header.data(), "SQLite format 3", header.size()) != 0)
+        return fail(NextStep::refuse_input,
+                    fmt::format("database {}: not an SQLite database; name another file", database.string()));
+
+    auto probe = sqlite::Database::open(database, sqlite::OpenMode::read_write, busy_timeout_ms);
+    if (!probe) {
+        if (probe.error().next == NextStep::stop) return true;
+        return std::unexpected(probe.error());
+    }
+    (*probe)->leave_wal_alone_on_close();
+    auto check = (*probe)->query("PRAGMA quick_check(1)");
+    const bool sound = check.next() && check.text(0) == "ok";
+    if (auto status = check.status(); !status && status.error().next != NextStep::stop)
+        return std::unexpected(status.error());
+    return !sound;
+}
+
+Result<std::filesystem::path> put_aside(const std::filesystem::path& database, Moment now) {
+    const auto seconds = static_cast<std::time_t>(now.wall_ns / 1'000'000'000);
+    const auto stem = fmt::format("{}.damaged-{:%Y%m%dT%H%M%SZ}", database.string(), fmt::gmtime(seconds));
+    std::string target = stem;
+    for (int i = 2; std::filesystem::exists(target); ++i) target = fmt::format("{}-{}", stem, i);
+    // The database last: as long as it is in place, the next start finds the damage again.
+    for (const char* suffix : {"-wal", "-shm", ""}) {
+        std::error_code error;
+        std::filesystem::rename(database.string() + suffix, target + suffix, error);
+        if (error && error != std::errc::no_such_file_or_directory)
+            return fail(NextStep::stop,
+                        fmt::format("database {}: damaged, and cannot be renamed to {}: {}",
+                                    database.string() + suffix, target + suffix, error.message()));
+    }
+    sync_folder(database);
+    return std::filesystem::path(target);
+}
+
+}  // namespace thermbal

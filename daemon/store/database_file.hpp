@@ -1,0 +1,36 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "base/error.hpp"
+#include "store/records.hpp"
+
+namespace thermbal {
+
+/// The exclusive right to write a database: flock on `<database>.lock`, which the kernel gives back when the
+/// process ends, however it ends.
+class WriterLock {
+  public:
+    /// `refuse_input` with the holder's process id when another Store has it.
+    static Result<WriterLock> take(const std::filesystem::path& database);
+    WriterLock(WriterLock&&) noexcept;
+    WriterLock& operator=(WriterLock&&) = delete;
+    ~WriterLock();
+
+  private:
+    explicit WriterLock(int fd) : fd_(fd) {}
+    int fd_;
+};
+
+/// Creates an empty file (mode 0640) with its folder entry on the disk; leaves an existing one alone.
+Result<void> create_if_absent(const std::filesystem::path& database);
+
+/// Whether pages or schema are damaged. Changes nothing. A file that is no SQLite database at all is
+/// `refuse_input`: it is probably somebody else's.
+Result<bool> is_damaged(const std::filesystem::path& database, int busy_timeout_ms);
+
+/// Renames a database with its -wal and -shm to <name>.damaged-<time>; returns the new name.
+Result<std::filesystem::path> put_aside(const std::filesystem::path& database, Moment now);
+
+}  // namespace thermbal

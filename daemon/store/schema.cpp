@@ -1,0 +1,194 @@
+#include "schema.hpp"
+
+#include <array>
+
+#include <fmt/format.h>
+
+namespace thermbal {
+
+namespace {
+
+// Steps are never edited once released: a step that is wrong is mended by the next one.
+constexpr const char* version_1 = R"sql(
+CREATE TABLE tests (
+  id INTEGER PRIMARY KEY,
+  name TEXT NOT NULL,
+  machine TEXT NOT NULL,
+  config_toml TEXT NOT NULL,
+  version TEXT NOT NULL,
+  period_s REAL NOT NULL CHECK (period_s > 0),
+  keep_measuring INTEGER NOT NULL CHECK (keep_measuring IN (0, 1)),
+  state TEXT NOT NULL CHECK (state IN ('running', 'declared', 'stopped', 'aborted')),
+  started_wall_ns INTEGER NOT NULL,
+  started_monotonic_ns INTEGER NOT NULL,
+  boot_id TEXT NOT NULL,
+  ended_wall_ns INTEGER,
+  ended_monotonic_ns INTEGER,
+  stop_reason TEXT NOT NULL DEFAULT '',
+  CHECK ((state IN ('running', 'declared')) = (ended_wall_ns IS NULL)),
+  CHECK ((ended_wall_ns IS NULL) = (ended_monotonic_ns IS NULL))
+) STRICT;
+CREATE UNIQUE INDEX one_open_test ON tests ((1)) WHERE state IN ('running', 'declared');
+
+CREATE TABLE channels (
+  test_id INTEGER NOT NULL REFERENCES tests,
+  position INTEGER NOT NULL CHECK (position >= 0),
+  name TEXT NOT NULL CHECK (name <> ''),
+  role TEXT NOT NULL,
+  place TEXT NOT NULL,
+  required INTEGER NOT NULL CHECK (required IN (0, 1)),
+  source TEXT NOT NULL,
+  PRIMARY KEY (test_id, position),
+  UNIQUE (test_id, name)
+) STRICT, WITHOUT ROWID;
+
+CREATE TABLE scans (
+  test_id INTEGER NOT NULL REFERENCES tests,
+  scan INTEGER NOT NULL CHECK (scan >= 0),
+  status TEXT NOT NULL CHECK (status IN ('ok', 'late', 'repeated', 'missed')),
+  time_s REAL NOT NULL,
+  scheduled_ns INTEGER NOT NULL,
+  started_ns INTEGER,
+  finished_ns INTEGER,
+  wall_ns INTEGER NOT NULL,
+  PRIMARY KEY (test_id, scan),
+  CHECK (status <> 'missed' OR (started_ns IS NULL AND finished_ns IS NULL))
+) STRICT, WITHOUT ROWID;
+
+CREATE TABLE samples (
+  test_id INTEGER NOT NULL,
+  scan INTEGER NOT NULL,
+  channel INTEGER NOT NULL,
+  raw INTEGER CHECK (raw BETWEEN 0 AND 4294967295),
+  value_C REAL CHECK (abs(value_C) < 1e300),
+  quality TEXT NOT NULL CHECK (quality IN ('good', 'open', 'shorted', 'over_range', 'under_range', 'stuck',
+                                           'stale', 'communication', 'gap')),
+  PRIMARY KEY (test_id, scan, channel),
+  FOREIGN KEY (test_id, scan) REFERENCES scans,
+  FOREIGN KEY (test_id, channel) REFERENCES channels,
+  CHECK ((quality = 'good') = (value_C IS NOT NULL))
+) STRICT, WITHOUT ROWID;
+
+CREATE TABLE inputs (
+  test_id INTEGER NOT NULL,
+  scan INTEGER NOT NULL,
+  name TEXT NOT NULL CHECK (name <> ''),
+  value REAL,
+  PRIMARY KEY (test_id, scan, name),
+  FOREIGN KEY (test_id, scan) REFERENCES scans
+) STRICT, WITHOUT ROWID;
+
+CREATE TABLE declarations (
+  test_id INTEGER NOT NULL,
+  channel INTEGER NOT NULL,
+  window_end_scan INTEGER NOT NULL,
+  declared_at_min REAL NOT NULL,
+  n INTEGER NOT NULL,
+  C REAL,
+  sigma REAL,
+  steady_state_C REAL,
+  steady_state_low_C REAL,
+  steady_state_high_C REAL,
+  equilibrium_time_min REAL,
+  rmse_by_n_C TEXT NOT NULL CHECK (json_valid(rmse_by_n_C)),
+  basis TEXT NOT NULL CHECK (json_valid(basis)),
+  version TEXT NOT NULL,
+  PRIMARY KEY (test_id, channel),
+  FOREIGN KEY (test_id, channel) REFERENCES channels,
+  FOREIGN KEY (test_id, window_end_scan) REFERENCES scans
+) STRICT;
+
+CREATE TABLE identifications (
+  test_id INTEGER NOT NULL,
+  channel INTEGER NOT NULL,
+  window_end_scan INTEGER NOT NULL,
+  wall_ns INTEGER NOT NULL,
+  verdict TEXT NOT NULL CHECK (json_valid(verdict)),
+  PRIMARY KEY (test_id, channel, window_end_scan),
+  FOREIGN KEY (test_id, channel) REFERENCES channels,
+  FOREIGN KEY (test_id, window_end_scan) REFERENCES scans
+) STRICT;
+
+CREATE TABLE events (
+  id INTEGER PRIMARY KEY,
+  test_id INTEGER REFERENCES tests,
+  wall_ns INTEGER NOT NULL,
+  time_s REAL,
+  kind TEXT NOT NULL CHECK (kind <> ''),
+  channel TEXT,
+  message TEXT NOT NULL
+) STRICT;
+CREATE INDEX events_of_a_test ON events (test_id, id);
+
+CREATE VIEW readings AS
+  SELECT s.test_id, s.scan, g.time_s, g.wall_ns, c.name AS channel, s.raw, s.value_C, s.quality
+  FROM samples s JOIN scans g USING (test_id, scan)
+  JOIN channels c ON c.test_id = s.test_id AND c.position = s.channel;
+)sql";
+
+// What earlier tests taught, for the priors of the next one.
+constexpr const char* version_2 = R"sql(
+CREATE TABLE archive (
+  id INTEGER PRIMARY KEY,
+  machine TEXT NOT NULL,
+  test_id INTEGER REFERENCES tests,
+  created_wall_ns INTEGER NOT NULL,
+  spectrum TEXT NOT NULL CHECK (json_valid(spectrum))
+) STRICT;
+CREATE INDEX archive_of_a_machine ON archive (machine, id);
+)sql";
+
+constexpr std::array steps = {version_1, version_2};
+
+}  // namespace
+
+int schema_version() {
+    return static_cast<int>(steps.size());
+}
+
+Result<void> check_schema(sqlite::Database& database, bool may_migrate) {
+    const auto version = database.integer("PRAGMA user_version");
+    if (!version) return std::unexpected(version.error());
+    const auto id = database.integer("PRAGMA application_id");
+    if (!id) return std::unexpected(id.error());
+    const auto tables = database.integer("SELECT count(*) FROM sqlite_schema");
+    if (!tables) return std::unexpected(tables.error());
+
+    const bool empty = *tables == 0 && *version == 0;
+    if (empty && may_migrate) return {};
+    if (*id != application_id)
+        return fail(NextStep::refuse_input,
+                    fmt::format("database {}: not a database of thermbald; name another file",
+                                database.path().string()));
+    if (*version > schema_version())
+        return fail(
+            NextStep::refuse_input,
+            fmt::format(
+                "database {}: schema version {}, this program knows up to {}; use the newer thermbald "
+                "that wrote it, or name another file",
+                database.path().string(), *version, schema_version()));
+    if (*version < schema_version() && !may_migrate)
+        return fail(
+            NextStep::refuse_input,
+            fmt::format("database {}: schema version {}, this program reads {}; start thermbald on it once, "
+                        "which brings it up to date",
+                        database.path().string(), *version, schema_version()));
+    return {};
+}
+
+Result<void> migrate(sqlite::Database& database) {
+    sqlite::Transaction transaction(database, sqlite::Transaction::Kind::write);
+    if (!transaction.begun()) return transaction.begun();
+    const auto version = database.integer("PRAGMA user_version");
+    if (!version) return std::unexpected(version.error());
+    if (*version == schema_version()) return {};
+    for (auto step = static_cast<std::size_t>(*version); step < steps.size(); ++step)
+        if (auto done = database.execute(steps[step]); !done) return done;
+    if (auto stamped = database.execute(fmt::format("PRAGMA user_version = {}; PRAGMA application_id = {}",
+                                                    schema_version(), application_id));
+        !stamped)
+        return stamped;
+    return transaction.commit();
+}
+
+}  // namespace thermbal
