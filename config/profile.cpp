@@ -59,7 +59,7 @@ std::optional<FaultCode> read_fault(TableReader& reader, RegisterType type) {
     if (one == (reader.has("from") || reader.has("to"))) {
         reader.complain("number", "accepted: either number, or from and to");
     }
-    reader.require("quality", "\"open\", \"shorted\", \"over_range\", \"under_range\" or \"stale\"");
+    reader.require("quality", "\"open\", \"short\", \"over_range\", \"under_range\" or \"stale\"");
     const auto first = fault_number(reader, one ? "number" : "from", type);
     const auto last = one ? first : fault_number(reader, "to", type);
     const auto quality = fault_quality(reader, "quality");
