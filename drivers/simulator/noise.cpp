@@ -18,6 +18,13 @@ double uniform(std::uint64_t bits) {
     return (static_cast<double>(bits >> 11U) + 0.5) * 0x1.0p-53;
 }
 
+double rounded(double value, double step) {
+    const double steps_per_one = std::round(1.0 / step);
+    // 0.1 is no binary number, 10 is: dividing by it gives the double that is nearest to the decimal.
+    if (std::abs(steps_per_one * step - 1.0) < 1e-12) return std::round(value * steps_per_one) / steps_per_one;
+    return std::round(value / step) * step;
+}
+
 }  // namespace
 
 double gaussian_at(std::uint64_t seed, std::size_t channel, std::int64_t index) {
@@ -34,8 +41,7 @@ double measured_C(double true_C, std::size_t channel, double time_s, const Noise
         const auto conversion = static_cast<std::int64_t>(std::floor(time_s / options.conversion_s));
         value_C += options.noise_C * gaussian_at(options.seed, channel, conversion);
     }
-    if (options.round_C > 0.0) value_C = std::round(value_C / options.round_C) * options.round_C;
-    return value_C;
+    return options.round_C > 0.0 ? rounded(value_C, options.round_C) : value_C;
 }
 
 }  // namespace thermbal
