@@ -13,6 +13,7 @@ namespace thermbal {
 namespace {
 
 std::string shown(const toml::node& node) {
+    if (const auto text = node.value_exact<std::string>()) return quoted(*text);
     std::ostringstream text;
     node.visit([&](const auto& value) { text << value; });
     std::string one_line = text.str();

@@ -114,15 +114,16 @@ TEST_P(LinkTest, LateReplyIsNeverTheNextReading) {
 }
 
 TEST_P(LinkTest, LateReplyIsNeverTheNextReadingWhenAskedAgainAtOnce) {
-    // Later than the whole silence that follows a timeout: only the different length of the probe can tell.
+    // Later than the whole silence that follows a timeout, with no other reply close behind it: on RTU only
+    // the different length of the probe can tell whose it is.
     start([](const Heard& heard, const Send& send, const HangUp&) {
-        if (heard.number == 2) wait(330);
+        wait(heard.number == 2 ? 250 : 30);
         send(heard.right_reply());
     });
     EXPECT_TRUE(read());
     int good = 0;
     for (int i = 0; i < 12; ++i) good += read(8 * (i % 3)) ? 1 : 0;
-    EXPECT_GE(good, 8) << message_;
+    EXPECT_GE(good, 6) << message_;
     EXPECT_TRUE(read());
 }
 
