@@ -53,14 +53,51 @@ std::vector<double> lagged(const std::vector<double>& input, double period_min, 
     return output;
 }
 
+double median(std::vector<double>& values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+void reject_spikes(std::vector<double>& values) {
+    constexpr std::size_t reach = 4;
+    constexpr double sigmas = 5.0;
+    constexpr double sigma_per_mad = 1.4826;
+    std::vector<double> deviation(values.size(), 0.0);
+    std::vector<double> local_scatter(values.size(), 0.0);
+    std::vector<double> all;
+    std::vector<double> near;
+    for (std::size_t k = 0; k < values.size(); ++k) {
+        if (std::isnan(values[k])) continue;
+        near.clear();
+        const std::size_t last = std::min(values.size(), k + reach + 1);
+        for (std::size_t other = k < reach ? 0 : k - reach; other < last; ++other) {
+            if (!std::isnan(values[other])) near.push_back(values[other]);
+        }
+        const double centre = median(near);
+        deviation[k] = std::abs(values[k] - centre);
+        for (double& value : near) value = std::abs(value - centre);
+        local_scatter[k] = median(near);
+        all.push_back(deviation[k]);
+    }
+    if (all.empty()) return;
+    const double typical = std::max(sigma_per_mad * median(all), 0.3 * smallest_step(values));
+    for (std::size_t k = 0; k < values.size(); ++k) {
+        const double scatter = std::max(typical, sigma_per_mad * local_scatter[k]);
+        if (!std::isnan(values[k]) && deviation[k] > sigmas * scatter) values[k] = std::nan("");
+    }
+}
+
 struct Decomposition {
     Eigen::MatrixXd weighted;  // sqrt(count) * design
     Eigen::MatrixXd eigenvectors;
     Eigen::VectorXd eigenvalues;  // those that carry information
+    Eigen::MatrixXd fine;         // the fine columns in the rotated frame
 };
 
 /// Gram matrices lose half the digits; what is lost lies far below what samples of 0.01 C can tell.
-Decomposition decompose(const Eigen::MatrixXd& design, const Eigen::VectorXd& count) {
+Decomposition decompose(const Eigen::MatrixXd& design, const Eigen::MatrixXd& fine,
+                        const Eigen::VectorXd& count) {
     constexpr double negligible = 1e-12;
     Decomposition result;
     result.weighted = count.cwiseSqrt().asDiagonal() * design;
@@ -72,6 +109,9 @@ Decomposition decompose(const Eigen::MatrixXd& design, const Eigen::VectorXd& co
     while (kept < all.size() && all[all.size() - 1 - kept] > negligible * largest) ++kept;
     result.eigenvalues = all.tail(kept);
     result.eigenvectors = solver.eigenvectors().rightCols(kept);
+    const Eigen::MatrixXd weighted_fine = count.cwiseSqrt().asDiagonal() * fine;
+    result.fine = result.eigenvalues.cwiseSqrt().cwiseInverse().asDiagonal() *
+                  (result.eigenvectors.transpose() * (result.weighted.transpose() * weighted_fine));
     return result;
 }
 
@@ -134,6 +174,12 @@ BlockMeans block_means(const std::vector<double>& values, Eigen::Index rows, std
     return blocks;
 }
 
+TestWindow without_spikes(const TestWindow& window) {
+    TestWindow clean = window;
+    for (Column& column : clean.channels) reject_spikes(column.values);
+    return clean;
+}
+
 AmbientInput ambient_input(const TestWindow& window, std::string_view ambient, double tail_min) {
     AmbientInput input;
     const Column* column = ambient.empty() ? nullptr : window.channel(ambient);
@@ -187,6 +233,13 @@ Eigen::MatrixXd block_design(const Basis& basis, const TestWindow& window, const
     return design;
 }
 
+Eigen::MatrixXd block_steps(const std::vector<double>& time_constant_min, const TestWindow& window,
+                            std::size_t scans_per_block) {
+    Basis basis;
+    basis.time_constant_min = time_constant_min;
+    return block_design(basis, window, AmbientInput{}, scans_per_block).rightCols(basis.grid());
+}
+
 Eigen::MatrixXd future_design(const Basis& basis, const TestWindow& window, const AmbientInput& ambient,
                               const std::vector<double>& after_min) {
     const auto rows = static_cast<Eigen::Index>(after_min.size());
@@ -209,7 +262,8 @@ Eigen::MatrixXd future_design(const Basis& basis, const TestWindow& window, cons
     return design;
 }
 
-std::vector<ReducedChannel> reduce_channels(const Eigen::MatrixXd& design, const TestWindow& window,
+std::vector<ReducedChannel> reduce_channels(const Eigen::MatrixXd& design, const Eigen::MatrixXd& fine,
+                                            const TestWindow& window,
                                             const std::vector<std::size_t>& channels,
                                             std::size_t scans_per_block) {
     std::vector<ReducedChannel> result(channels.size());
@@ -224,11 +278,12 @@ std::vector<ReducedChannel> reduce_channels(const Eigen::MatrixXd& design, const
         channel.resolution_C = smallest_step(values);
         if (blocks.good == 0) continue;
         if (shared_count.size() != blocks.count.size() || shared_count != blocks.count) {
-            shared = decompose(design, blocks.count);
+            shared = decompose(design, fine, blocks.count);
             shared_count = blocks.count;
         }
         const Eigen::VectorXd weighted = blocks.count.cwiseSqrt().cwiseProduct(blocks.mean);
         const Eigen::VectorXd root = shared.eigenvalues.cwiseSqrt();
+        channel.reduced_fine = shared.fine;
         channel.reduced = root.asDiagonal() * shared.eigenvectors.transpose();
         channel.rotated = root.cwiseInverse().asDiagonal() *
                           (shared.eigenvectors.transpose() * (shared.weighted.transpose() * weighted));

@@ -20,6 +20,10 @@ struct AmbientInput {
 
 AmbientInput ambient_input(const TestWindow& window, std::string_view ambient, double tail_min);
 
+/// The window with isolated outliers taken out (NaN): samples further from the median of their neighbours
+/// than the scatter of the channel, and of the place, explains (Hampel's identifier).
+TestWindow without_spikes(const TestWindow& window);
+
 /// Basis columns: level, one step response a time constant, and with an ambient its deviation passed through
 /// a first-order lag of every time constant.
 struct Basis {
@@ -35,6 +39,10 @@ std::vector<double> logarithmic_grid(double first, double last, std::size_t poin
 /// Rows are blocks of scans (means over the scans of a block), columns the basis.
 Eigen::MatrixXd block_design(const Basis& basis, const TestWindow& window, const AmbientInput& ambient,
                              std::size_t scans_per_block);
+
+/// The step columns alone: 1 - exp(-t / tau), one column a time constant, means over blocks.
+Eigen::MatrixXd block_steps(const std::vector<double>& time_constant_min, const TestWindow& window,
+                            std::size_t scans_per_block);
 
 /// Rows are the times of `after_min` (minutes after the window's last scan) with the ambient held at its tail
 /// mean.
@@ -60,6 +68,7 @@ double smallest_step(const std::vector<double>& values);
 /// rotated = reduced * coefficients + N(0, row_variance).
 struct ReducedChannel {
     Eigen::MatrixXd reduced;
+    Eigen::MatrixXd reduced_fine;  ///< the same rotation of the fine grid's step columns
     Eigen::VectorXd rotated;
     double centre_C = 0.0;            ///< taken off the samples before; add to the level
     double sample_variance = 0.0;     ///< of one sample about the best fit, floored by the resolution
@@ -71,7 +80,8 @@ struct ReducedChannel {
 };
 
 /// Channels with the same samples missing share one decomposition.
-std::vector<ReducedChannel> reduce_channels(const Eigen::MatrixXd& design, const TestWindow& window,
+std::vector<ReducedChannel> reduce_channels(const Eigen::MatrixXd& design, const Eigen::MatrixXd& fine,
+                                            const TestWindow& window,
                                             const std::vector<std::size_t>& channels,
                                             std::size_t scans_per_block);
 

@@ -6,8 +6,10 @@
 
 #include <fmt/format.h>
 
+#include "channel_model.hpp"
 #include "design.hpp"
-#include "gibbs.hpp"
+#include "mode_sampler.hpp"
+#include "random.hpp"
 #include "series/sample.hpp"
 
 namespace thermbal {
@@ -25,30 +27,41 @@ std::size_t scans_per_block(const TestWindow& window, const SpectrumOptions& opt
         1, static_cast<std::size_t>(std::lround(options.block_min * seconds_per_min / window.period_s)));
 }
 
-WeightPrior weight_prior(const Basis& basis, const std::optional<SpectrumPrior>& archive,
-                         const SpectrumOptions& options) {
+ModePrior mode_prior(const std::optional<SpectrumPrior>& archive, const SpectrumOptions& options) {
+    const auto points = static_cast<Eigen::Index>(options.grid);
+    ModePrior prior;
+    prior.log_tau.resize(points);
+    prior.intensity.resize(points);
+    prior.log_variance_mean = Eigen::VectorXd::Constant(points, options.mode_log_variance_mean);
+    prior.log_variance_sd = Eigen::VectorXd::Constant(points, options.mode_log_variance_sd);
+    const std::vector<double> grid = logarithmic_grid(options.fastest_min, options.slowest_min, options.grid);
+    for (Eigen::Index g = 0; g < points; ++g) {
+        const double tau = grid[static_cast<std::size_t>(g)];
+        prior.log_tau[g] = std::log(tau);
+        prior.intensity[g] =
+            tau > options.falloff_min ? std::pow(options.falloff_min / tau, options.falloff_power) : 1.0;
+    }
+    prior.intensity *= options.expected_modes / prior.intensity.sum();
+    if (!archive) return prior;
+    for (Eigen::Index g = 0; g < points; ++g) {
+        const auto index = static_cast<std::size_t>(g);
+        prior.intensity[g] = archive->intensity[index];
+        prior.log_variance_mean[g] = archive->log_variance_mean[index];
+        prior.log_variance_sd[g] = archive->log_variance_sd[index];
+    }
+    return prior;
+}
+
+BackgroundPrior background_prior(const Basis& basis, const SpectrumOptions& options) {
     const Eigen::Index grid = basis.grid();
-    WeightPrior prior;
-    prior.shape = Eigen::VectorXd::Constant(grid, options.weight_shape);
-    prior.fixed_rate = Eigen::VectorXd::Zero(grid);
-    prior.level_profile = Eigen::VectorXd::Zero(grid);
-    prior.level_shape = options.base_shape;
-    prior.level_rate = options.base_shape / options.base_level;
-    prior.scale_shape = options.scale_shape;
-    prior.scale_floor = options.scale_floor;
+    BackgroundPrior prior;
+    prior.level_profile.resize(grid);
     prior.ambient_gain_sd = options.ambient_gain_sd;
     for (Eigen::Index j = 0; j < grid; ++j) {
-        const auto index = static_cast<std::size_t>(j);
-        const double tau = basis.time_constant_min[index];
-        prior.level_profile[j] =
-            options.weight_shape *
-            (tau > options.falloff_min ? std::pow(options.falloff_min / tau, options.falloff_power) : 1.0);
-        if (!archive) continue;
-        // An inverse gamma whose logarithm has the archive's mean and (nearly) its spread.
-        const double sd = std::max(0.3, archive->log_weight_sd[index]);
-        prior.shape[j] = 1.0 / (sd * sd) + 0.5;
-        prior.fixed_rate[j] = std::exp(archive->log_weight_mean[index]) * std::max(prior.shape[j] - 0.5, 0.1);
-        prior.level_profile[j] = 0.0;
+        const double tau = basis.time_constant_min[static_cast<std::size_t>(j)];
+        const double falloff =
+            tau > options.falloff_min ? std::pow(options.falloff_min / tau, options.falloff_power) : 1.0;
+        prior.level_profile[j] = options.background_level * falloff;
     }
     if (!basis.has_ambient) return prior;
     prior.ambient_mean.resize(grid);
@@ -63,6 +76,16 @@ WeightPrior weight_prior(const Basis& basis, const std::optional<SpectrumPrior>&
     prior.ambient_variance = 0.5 * prior.ambient_mean;
     return prior;
 }
+
+/// A channel's steady state as the sampling leaves it: an equal mixture of normals, and amplitude draws for
+/// its curve.
+struct ChannelDraws {
+    std::vector<double> mean;
+    std::vector<double> variance;
+    Eigen::VectorXd background;  // posterior mean coefficients of the basis
+    Eigen::VectorXd fine;        // posterior mean amplitudes on the modes' grid
+    std::vector<double> equilibrium_min;
+};
 
 Eigen::VectorXd steady_state_functional(const Basis& basis, const AmbientInput& ambient) {
     Eigen::VectorXd functional = Eigen::VectorXd::Ones(basis.size());
@@ -94,11 +117,26 @@ double mixture_quantile(const ChannelDraws& draws, double widening, double proba
 /// Minutes of the prediction grid: inside the window coarsely, beyond it on a geometric grid.
 struct CurveGrid {
     std::vector<double> minute;  ///< since the window's start
-    Eigen::MatrixXd design;
+    Eigen::MatrixXd design;      ///< of the basis
+    Eigen::MatrixXd fine;        ///< step columns of the modes' grid
 };
 
+Eigen::MatrixXd step_columns(const std::vector<double>& time_constant_min,
+                             const std::vector<double>& minute) {
+    Eigen::MatrixXd columns(static_cast<Eigen::Index>(minute.size()),
+                            static_cast<Eigen::Index>(time_constant_min.size()));
+    for (std::size_t j = 0; j < time_constant_min.size(); ++j) {
+        for (std::size_t row = 0; row < minute.size(); ++row) {
+            columns(static_cast<Eigen::Index>(row), static_cast<Eigen::Index>(j)) =
+                -std::expm1(-minute[row] / time_constant_min[j]);
+        }
+    }
+    return columns;
+}
+
 CurveGrid curve_grid(const Basis& basis, const TestWindow& window, const AmbientInput& ambient,
-                     const Eigen::MatrixXd& blocks, std::size_t per_block) {
+                     const Eigen::MatrixXd& blocks, std::size_t per_block,
+                     const std::vector<double>& fine_grid) {
     CurveGrid grid;
     const double period_min = window.period_s / seconds_per_min;
     for (Eigen::Index row = 0; row < blocks.rows(); ++row) {
@@ -113,6 +151,7 @@ CurveGrid curve_grid(const Basis& basis, const TestWindow& window, const Ambient
     const Eigen::MatrixXd future = future_design(basis, window, ambient, after);
     grid.design.resize(blocks.rows() + future.rows(), basis.size());
     grid.design << blocks, future;
+    grid.fine = step_columns(fine_grid, grid.minute);
     return grid;
 }
 
@@ -153,19 +192,53 @@ double slowest_carrying(const std::vector<double>& grid, const Eigen::VectorXd& 
     return grid.front();
 }
 
-Result<void> check_prior(const std::optional<SpectrumPrior>& prior, const std::vector<double>& grid) {
+Result<void> check_prior(const std::optional<SpectrumPrior>& prior, const SpectrumOptions& options) {
     if (!prior) return {};
-    const bool fits = prior->time_constant_min.size() == grid.size() &&
-                      prior->log_weight_mean.size() == grid.size() &&
-                      prior->log_weight_sd.size() == grid.size() &&
-                      std::abs(prior->time_constant_min.back() / grid.back() - 1.0) < 1e-6;
+    const std::size_t points = options.grid;
+    const bool fits = prior->time_constant_min.size() == points && prior->intensity.size() == points &&
+                      prior->log_variance_mean.size() == points && prior->log_variance_sd.size() == points &&
+                      std::abs(prior->time_constant_min.front() / options.fastest_min - 1.0) < 1e-6 &&
+                      std::abs(prior->time_constant_min.back() / options.slowest_min - 1.0) < 1e-6;
     if (fits) return {};
     return fail(
         NextStep::refuse_input,
         fmt::format(
             "the archive's spectrum has {} time constants, the options ask for {}: learn it again from "
             "the stored tests",
-            prior->time_constant_min.size(), grid.size()));
+            prior->time_constant_min.size(), points));
+}
+
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+}
+
+Eigen::VectorXd relative_variances(const std::vector<Mode>& modes) {
+    Eigen::VectorXd variance(static_cast<Eigen::Index>(modes.size()));
+    for (std::size_t k = 0; k < modes.size(); ++k)
+        variance[static_cast<Eigen::Index>(k)] = std::exp(modes[k].log_variance);
+    return variance;
+}
+
+/// Spreads one value a mode over the two grid points about each mode.
+void add_on_grid(const std::vector<Mode>& modes, const Eigen::VectorXd& value, double factor,
+                 Eigen::VectorXd& grid) {
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+        const auto below = std::min(static_cast<Eigen::Index>(modes[k].position), grid.size() - 2);
+        const double share = modes[k].position - static_cast<double>(below);
+        grid[below] += factor * (1.0 - share) * value[static_cast<Eigen::Index>(k)];
+        grid[below + 1] += factor * share * value[static_cast<Eigen::Index>(k)];
+    }
+}
+
+/// Step columns of the modes at the minutes of a curve.
+Eigen::MatrixXd mode_curves(const std::vector<Mode>& modes, const ModePrior& prior,
+                            const std::vector<double>& minute) {
+    const double spacing = prior.log_tau[1] - prior.log_tau[0];
+    std::vector<double> tau;
+    for (const Mode& mode : modes) tau.push_back(std::exp(prior.log_tau[0] + spacing * mode.position));
+    return step_columns(tau, minute);
 }
 
 }  // namespace
@@ -174,80 +247,141 @@ Result<void> SpectrumOptions::check() const {
     const auto refuse = [](std::string_view field, double found, std::string_view accepted) {
         return fail(NextStep::refuse_input, fmt::format("{} is {}, accepted is {}", field, found, accepted));
     };
-    if (time_constants < 4 || time_constants > 200) {
-        return refuse("time_constants", static_cast<double>(time_constants), "4 to 200");
+    if (grid < 8 || grid > 1000) return refuse("grid", static_cast<double>(grid), "8 to 1000");
+    if (background_points < 4 || background_points > 200) {
+        return refuse("background_points", static_cast<double>(background_points), "4 to 200");
     }
     if (!(fastest_min > 0.0)) return refuse("fastest_min", fastest_min, "above 0");
     if (!(slowest_min > fastest_min)) return refuse("slowest_min", slowest_min, "above fastest_min");
     if (!(block_min > 0.0)) return refuse("block_min", block_min, "above 0");
+    if (!(expected_modes > 0.0)) return refuse("expected_modes", expected_modes, "above 0");
     if (!(falloff_min > 0.0)) return refuse("falloff_min", falloff_min, "above 0");
-    if (!(weight_shape > 0.0)) return refuse("weight_shape", weight_shape, "above 0");
-    if (!(base_level > 0.0)) return refuse("base_level", base_level, "above 0");
-    if (!(base_shape > 0.0)) return refuse("base_shape", base_shape, "above 0");
+    if (!(mode_log_variance_sd > 0.0)) return refuse("mode_log_variance_sd", mode_log_variance_sd, "above 0");
+    if (!(background_level > 0.0)) return refuse("background_level", background_level, "above 0");
     if (!(ambient_gain_sd > 0.0)) return refuse("ambient_gain_sd", ambient_gain_sd, "above 0");
     if (draws < 20) return refuse("draws", static_cast<double>(draws), "20 or more");
+    if (thinning < 1) return refuse("thinning", static_cast<double>(thinning), "1 or more");
     return {};
 }
 
-Result<SpectrumEstimate> estimate_spectrum(const TestWindow& window, std::string_view ambient,
+Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::string_view ambient,
                                            const std::optional<SpectrumPrior>& prior,
                                            const SpectrumOptions& options, std::uint64_t seed,
                                            const std::vector<double>& start_level_C) {
     if (const Result<void> valid = options.check(); !valid) return std::unexpected(valid.error());
-    if (!ambient.empty() && window.channel(ambient) == nullptr) {
+    if (!ambient.empty() && recorded.channel(ambient) == nullptr) {
         return fail(
             NextStep::refuse_input,
             fmt::format("the ambient channel {} is not in the window; name one that is, or none", ambient));
     }
-    if (window.scans == 0 || (window.end_s() - window.start_s) < minimum_window_min * seconds_per_min) {
+    if (recorded.scans == 0 || (recorded.end_s() - recorded.start_s) < minimum_window_min * seconds_per_min) {
         return fail(NextStep::refuse_input, fmt::format("the window has {} scans; at least {} min are needed",
-                                                        window.scans, minimum_window_min));
+                                                        recorded.scans, minimum_window_min));
     }
     std::vector<std::size_t> structural;
-    for (std::size_t i = 0; i < window.channels.size(); ++i) {
-        if (window.channels[i].name != ambient) structural.push_back(i);
+    for (std::size_t i = 0; i < recorded.channels.size(); ++i) {
+        if (recorded.channels[i].name != ambient) structural.push_back(i);
     }
     if (structural.empty()) return fail(NextStep::refuse_input, "the window has no structural channel");
 
+    const TestWindow window = without_spikes(recorded);
     const AmbientInput room = ambient_input(window, ambient, options.ambient_tail_min);
-    Basis basis{logarithmic_grid(options.fastest_min, options.slowest_min, options.time_constants),
-                room.measured};
-    if (const Result<void> fits = check_prior(prior, basis.time_constant_min); !fits) {
-        return std::unexpected(fits.error());
-    }
+    const Basis basis{logarithmic_grid(options.fastest_min, options.slowest_min, options.background_points),
+                      room.measured};
+    if (const Result<void> fits = check_prior(prior, options); !fits) return std::unexpected(fits.error());
+    const std::vector<double> fine_grid =
+        logarithmic_grid(options.fastest_min, options.slowest_min, options.grid);
     const std::size_t per_block = scans_per_block(window, options);
     const Eigen::MatrixXd design = block_design(basis, window, room, per_block);
-    std::vector<ReducedChannel> reduced = reduce_channels(design, window, structural, per_block);
+    const std::vector<ReducedChannel> reduced =
+        reduce_channels(design, block_steps(fine_grid, window, per_block), window, structural, per_block);
     std::vector<std::size_t> used;
-    std::vector<ReducedChannel> used_channels;
+    std::vector<double> ranges;
     for (std::size_t i = 0; i < reduced.size(); ++i) {
         if (reduced[i].good_samples < 16) continue;
         used.push_back(i);
-        used_channels.push_back(reduced[i]);
+        ranges.push_back(reduced[i].range_C);
     }
+    if (used.empty())
+        return fail(NextStep::refuse_input, "no structural channel has 16 good samples in the window");
+    // A sensor far from the heat is flat at first because its modes cancel, not because they are small.
+    const double common = options.scale_floor * median(ranges);
     const Eigen::VectorXd functional = steady_state_functional(basis, room);
-    const SpectrumDraws draws =
-        sample_spectrum(used_channels, basis, functional, weight_prior(basis, prior, options),
-                        options.burn_in, options.draws, curve_draws, seed);
-    const CurveGrid curves = curve_grid(basis, window, room, design, per_block);
+    const BackgroundPrior background = background_prior(basis, options);
+    const ModePrior modes_prior = mode_prior(prior, options);
+    std::vector<ChannelModel> models;
+    std::vector<WhitenedChannel> whitened;
+    for (const std::size_t i : used) {
+        const double scale = std::sqrt(reduced[i].range_C * reduced[i].range_C + common * common +
+                                       9.0 * reduced[i].sample_variance);
+        models.emplace_back(reduced[i], basis, background, scale, functional);
+        whitened.push_back(models.back().whitened());
+    }
+    const std::vector<std::vector<Mode>> states =
+        sample_modes(whitened, modes_prior, options.burn_in, options.draws, options.thinning, seed);
+    const CurveGrid curves = curve_grid(basis, window, room, design, per_block, fine_grid);
+
+    Random random(seed ^ 0x5DEECE66DULL);
+    std::vector<ChannelDraws> draws(used.size());
+    for (ChannelDraws& each : draws) {
+        each.background = Eigen::VectorXd::Zero(basis.size());
+        each.fine = Eigen::VectorXd::Zero(modes_prior.log_tau.size());
+    }
+    Eigen::VectorXd density = Eigen::VectorXd::Zero(modes_prior.log_tau.size());
+    Eigen::VectorXd log_variance = Eigen::VectorXd::Zero(modes_prior.log_tau.size());
+    const double share = 1.0 / static_cast<double>(states.size());
+    const std::size_t curve_every = std::max<std::size_t>(1, states.size() / curve_draws);
+    const double start_min = window.start_s / seconds_per_min;
+    for (std::size_t state = 0; state < states.size(); ++state) {
+        const std::vector<Mode>& modes = states[state];
+        const Eigen::VectorXd variance = relative_variances(modes);
+        add_on_grid(modes, Eigen::VectorXd::Ones(variance.size()), share, density);
+        add_on_grid(modes, variance.array().log().matrix(), share, log_variance);
+        const bool with_curve = state % curve_every == 0;
+        const Eigen::MatrixXd steps =
+            with_curve ? mode_curves(modes, modes_prior, curves.minute) : Eigen::MatrixXd();
+        for (std::size_t k = 0; k < used.size(); ++k) {
+            ChannelModel& model = models[k];
+            model.condition_on(model.columns_at(modes), variance);
+            const ConditionalValue value = model.steady_state();
+            draws[k].mean.push_back(value.mean);
+            draws[k].variance.push_back(value.variance);
+            draws[k].background += share * model.mean_background();
+            add_on_grid(modes, model.mean_modes(), share, draws[k].fine);
+            if (!with_curve) continue;
+            const Eigen::VectorXd sample = model.draw(random);
+            const Eigen::VectorXd curve =
+                curves.design * sample.head(basis.size()) + steps * sample.tail(variance.size());
+            const double settled =
+                functional.dot(sample.head(basis.size())) + sample.tail(variance.size()).sum();
+            const double given = start_level_C.empty()
+                                     ? no_value
+                                     : start_level_C[structural[used[k]]] - reduced[used[k]].centre_C;
+            draws[k].equilibrium_min.push_back(
+                start_min +
+                crossing_time(curves.minute, curve, std::isnan(given) ? sample[0] : given, settled));
+        }
+    }
 
     SpectrumEstimate estimate;
-    estimate.time_constant_min = basis.time_constant_min;
+    estimate.time_constant_min = fine_grid;
+    estimate.background_time_constant_min = basis.time_constant_min;
+    for (Eigen::Index g = 0; g < density.size(); ++g) {
+        estimate.mode_density.push_back(density[g]);
+        estimate.mode_log_variance.push_back(density[g] > 0.0 ? log_variance[g] / density[g]
+                                                              : modes_prior.log_variance_mean[g]);
+    }
+    estimate.expected_modes = density.sum();
     estimate.window_start_s = window.start_s;
     estimate.window_end_s = window.end_s();
     estimate.ambient_reference_C = room.reference_C;
     estimate.ambient_tail_C = room.tail_C;
     estimate.has_ambient = room.measured;
     estimate.blocks = static_cast<std::size_t>(design.rows());
-    for (Eigen::Index j = 0; j < basis.grid(); ++j) {
-        estimate.weight.push_back(std::exp(draws.log_weight_mean[j]));
-        estimate.log_weight_sd.push_back(draws.log_weight_sd[j]);
-    }
-    Eigen::VectorXd amplitudes = Eigen::VectorXd::Zero(basis.grid());
-    const double start_min = window.start_s / seconds_per_min;
+    Eigen::VectorXd amplitudes = Eigen::VectorXd::Zero(modes_prior.log_tau.size());
     for (std::size_t k = 0; k < used.size(); ++k) {
-        const ReducedChannel& data = used_channels[k];
-        const ChannelDraws& channel_draws = draws.channels[k];
+        const ReducedChannel& data = reduced[used[k]];
+        const ChannelDraws& channel_draws = draws[k];
         ChannelEstimate channel;
         channel.channel = window.channels[structural[used[k]]].name;
         channel.good_samples = data.good_samples;
@@ -270,8 +404,10 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& window, std::string
             data.centre_C + mixture_quantile(channel_draws, options.interval_widening, 0.05);
         channel.steady_state_high_C =
             data.centre_C + mixture_quantile(channel_draws, options.interval_widening, 0.95);
-        Eigen::VectorXd coefficients = channel_draws.coefficient_mean;
-        const Eigen::VectorXd curve = curves.design * coefficients;
+        Eigen::VectorXd coefficients(basis.size() + channel_draws.fine.size());
+        coefficients << channel_draws.background, channel_draws.fine;
+        const Eigen::VectorXd curve =
+            curves.design * channel_draws.background + curves.fine * channel_draws.fine;
         coefficients[0] += data.centre_C;
         channel.coefficients.assign(coefficients.begin(), coefficients.end());
         channel.start_C = coefficients[0];
@@ -279,23 +415,17 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& window, std::string
         const double given = start_level_C.empty() ? no_value : start_level_C[structural[used[k]]];
         const double start_level = std::isnan(given) ? channel.start_C : given;
         channel.rise_C = channel.steady_state_C - start_level;
-        std::vector<double> times;
-        for (Eigen::Index d = 0; d < channel_draws.coefficients.cols(); ++d) {
-            const Eigen::VectorXd draw = channel_draws.coefficients.col(d);
-            const double own_start = std::isnan(given) ? draw[0] : given - data.centre_C;
-            times.push_back(start_min + crossing_time(curves.minute, curves.design * draw, own_start,
-                                                      functional.dot(draw)));
-        }
+        const std::vector<double>& times = channel_draws.equilibrium_min;
         channel.equilibrium_time_min =
             start_min + crossing_time(curves.minute, curve, start_level - data.centre_C, mean);
         channel.equilibrium_low_min = std::min(sorted_quantile(times, 0.05), channel.equilibrium_time_min);
         channel.equilibrium_high_min = std::max(sorted_quantile(times, 0.95), channel.equilibrium_time_min);
-        const Eigen::VectorXd own = channel_draws.coefficient_mean.segment(1, basis.grid());
-        channel.slowest_time_constant_min = slowest_carrying(basis.time_constant_min, own);
+        const Eigen::VectorXd& own = channel_draws.fine;
+        channel.slowest_time_constant_min = slowest_carrying(fine_grid, own);
         amplitudes += own.cwiseAbs();
         estimate.channels.push_back(std::move(channel));
     }
-    estimate.slowest_time_constant_min = slowest_carrying(basis.time_constant_min, amplitudes);
+    estimate.slowest_time_constant_min = slowest_carrying(fine_grid, amplitudes);
     return estimate;
 }
 
@@ -306,25 +436,31 @@ std::vector<double> predict_curve(const SpectrumEstimate& estimate, const Channe
         window_from(window_until(window, estimate.window_end_s), estimate.window_start_s);
     const AmbientInput room =
         ambient_input(fitted, estimate.has_ambient ? ambient : std::string_view{}, 15.0);
-    const Basis basis{estimate.time_constant_min, estimate.has_ambient};
+    const Basis basis{estimate.background_time_constant_min, estimate.has_ambient};
     const Eigen::MatrixXd inside = block_design(basis, fitted, room, 1);
     const Eigen::VectorXd coefficients = Eigen::Map<const Eigen::VectorXd>(
         channel.coefficients.data(), static_cast<Eigen::Index>(channel.coefficients.size()));
-    const Eigen::VectorXd past = inside * coefficients;
+    const Eigen::VectorXd of_basis = coefficients.head(basis.size());
+    const Eigen::VectorXd of_modes = coefficients.tail(coefficients.size() - basis.size());
+    std::vector<double> minute;
+    for (const double time : time_s) minute.push_back((time - fitted.start_s) / seconds_per_min);
+    const Eigen::VectorXd modes = step_columns(estimate.time_constant_min, minute) * of_modes;
+    const Eigen::VectorXd past = inside * of_basis;
     std::vector<double> after;
     for (const double time : time_s)
         after.push_back(std::max(0.0, (time - fitted.end_s()) / seconds_per_min));
-    const Eigen::VectorXd future = future_design(basis, fitted, room, after) * coefficients;
+    const Eigen::VectorXd future = future_design(basis, fitted, room, after) * of_basis;
     std::vector<double> curve;
     for (std::size_t k = 0; k < time_s.size(); ++k) {
         const double position = (time_s[k] - fitted.start_s) / fitted.period_s;
         if (position >= static_cast<double>(fitted.scans - 1)) {
-            curve.push_back(future[static_cast<Eigen::Index>(k)]);
+            curve.push_back(modes[static_cast<Eigen::Index>(k)] + future[static_cast<Eigen::Index>(k)]);
             continue;
         }
         const auto scan = static_cast<Eigen::Index>(std::max(0.0, std::floor(position)));
         const double share = std::clamp(position - static_cast<double>(scan), 0.0, 1.0);
-        curve.push_back((1.0 - share) * past[scan] + share * past[scan + 1]);
+        curve.push_back(modes[static_cast<Eigen::Index>(k)] + (1.0 - share) * past[scan] +
+                        share * past[scan + 1]);
     }
     return curve;
 }

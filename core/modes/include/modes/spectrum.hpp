@@ -15,34 +15,43 @@ namespace thermbal {
 /// How the shared spectrum of time constants is estimated. Defaults hold for a machine tool's spindle head on
 /// a 15 s grid; `check` names the field that is out of bounds.
 struct SpectrumOptions {
-    std::size_t time_constants = 28;  ///< points of the logarithmic grid
-    double fastest_min = 1.5;         ///< first grid point
-    double slowest_min = 600.0;       ///< last grid point
-    double block_min = 1.0;           ///< samples are averaged over blocks of this length
-    double falloff_min = 60.0;        ///< beyond this time constant less amplitude is expected ...
-    double falloff_power = 1.5;       ///< ... as (falloff / tau)^power
-    double weight_shape = 1.0;        ///< shape of the inverse-gamma prior of a weight
-    double base_level = 0.003;        ///< prior mean of the level that weights without support fall back to
-    double base_shape = 1.0;          ///< shape of the gamma prior of that level
-    double scale_shape = 2.0;         ///< shape of the inverse-gamma prior of a channel's squared scale
-    double scale_floor = 0.5;       ///< least expected scale, as a share of the median range of all channels
-    double ambient_gain_sd = 0.05;  ///< how well the channel follows the room in the end: 1 +- this
+    double block_min = 1.0;    ///< samples are averaged over blocks of this length
+    double fastest_min = 1.0;  ///< range of the modes' time constants
+    double slowest_min = 600.0;
+    std::size_t grid = 120;  ///< points of the modes' logarithmic grid; between them columns are interpolated
+
+    double expected_modes = 5.0;  ///< a priori, over the whole range
+    double falloff_min = 60.0;    ///< beyond this time constant modes are rarer ...
+    double falloff_power = 1.5;   ///< ... as (falloff / tau)^power
+    double mode_log_variance_mean =
+        -3.0;  ///< of a mode's variance relative to the channel's squared scale, natural log
+    double mode_log_variance_sd = 2.0;
+    double scale_floor = 0.5;  ///< least scale of a channel, as a share of the median range of all channels
+
+    std::size_t background_points =
+        28;                          ///< grid of the continuous background and of the response to the room
+    double background_level = 1e-4;  ///< variance of a background amplitude, relative to the squared scale
+
+    double ambient_gain_sd = 0.05;     ///< how well the channel follows the room in the end: 1 +- this
     double ambient_centre_min = 60.0;  ///< median time constant of the response to the room, a priori
     double ambient_spread = 1.2;       ///< its spread, sd of log(tau)
-    std::size_t burn_in = 60;          ///< Gibbs sweeps that are thrown away
-    std::size_t draws = 240;           ///< Gibbs sweeps that are kept
-    double interval_widening = 1.0;    ///< factor on every standard deviation of a steady state
     double ambient_tail_min = 15.0;    ///< the ambient stays at its mean over the last so many minutes
+
+    std::size_t burn_in = 1500;      ///< Metropolis-Hastings steps that are thrown away
+    std::size_t draws = 200;         ///< states that are kept
+    std::size_t thinning = 15;       ///< steps between them
+    double interval_widening = 1.0;  ///< factor on every conditional standard deviation of a steady state
 
     Result<void> check() const;
 };
 
-/// What earlier tests of the same machine say about the spectrum: for every time constant of the grid the
-/// mean of the logarithm of its weight and the spread of that logarithm between tests. See modes/archive.hpp.
+/// What earlier tests of the same machine say about its modes, on the grid of time constants: expected number
+/// of modes a cell, and mean and spread of the logarithm of their relative variance. See modes/archive.hpp.
 struct SpectrumPrior {
     std::vector<double> time_constant_min;
-    std::vector<double> log_weight_mean;
-    std::vector<double> log_weight_sd;
+    std::vector<double> intensity;
+    std::vector<double> log_variance_mean;
+    std::vector<double> log_variance_sd;
     std::size_t tests = 0;
 };
 
@@ -66,15 +75,16 @@ struct ChannelEstimate {
     double slowest_time_constant_min =
         0.0;  ///< slowest that carries at least 5 % of this channel's amplitudes
     std::size_t good_samples = 0;
-    std::vector<double>
-        coefficients;  ///< posterior mean: level, step amplitudes, ambient amplitudes (see predict_curve)
+    std::vector<double> coefficients;  ///< posterior mean, for predict_curve
 };
 
 struct SpectrumEstimate {
     std::vector<ChannelEstimate> channels;
-    std::vector<double> time_constant_min;
-    std::vector<double> weight;         ///< posterior geometric mean, relative to the channels' scale
-    std::vector<double> log_weight_sd;  ///< its posterior spread
+    std::vector<double> time_constant_min;  ///< grid of the modes
+    std::vector<double> mode_density;       ///< posterior expected number of modes in each cell of the grid
+    std::vector<double>
+        mode_log_variance;        ///< posterior mean log relative variance there; the prior's where none is
+    double expected_modes = 0.0;  ///< posterior mean of their number
     double window_start_s = 0.0;
     double window_end_s = 0.0;
     double ambient_reference_C = 0.0;  ///< mean over the first minutes of the window; 0 without ambient
@@ -82,23 +92,23 @@ struct SpectrumEstimate {
     bool has_ambient = false;
     double slowest_time_constant_min = 0.0;  ///< slowest that carries at least 5 % of all amplitudes
     std::size_t blocks = 0;                  ///< rows the fit saw
+    std::vector<double> background_time_constant_min;
 };
 
-/// Estimates where every structural channel of `window` settles from one spectrum of time constants that all
-/// of them share. With tau_j the grid, x_j(t) = 1 - exp(-t/tau_j) and u_j the ambient's deviation from its
-/// start passed through a first-order lag tau_j, channel i is
-///     y_i(t) = m_i + sum_j a_ij x_j(t) + sum_j b_ij u_j(t) + noise,   a_ij ~ N(0, s_i^2 w_j),  sum_j b_ij ~
-///     1,
-/// with weights w_j common to the channels, unknown, and sampled (Gibbs) together with scales and amplitudes.
-/// Free decay of an initial state that is not in equilibrium is part of a_ij.
+/// Estimates where every structural channel of `window` settles from time constants that all of them share.
+/// With x(t; tau) = 1 - exp(-t/tau), modes tau_k, k = 1 ... K, and u the ambient's deviation from its start,
+/// channel i is
+///     y_i(t) = m_i + sum_k a_ik x(t; tau_k) + background + sum_j b_ij (u through a lag tau_j) + noise,
+///     a_ik ~ N(0, s_i^2 v_k),   sum_j b_ij ~ 1.
+/// K, tau_k and v_k are unknown and sampled (reversible jump), everything linear is marginalised exactly.
+/// Free decay of an initial state that is not in equilibrium is part of the a_ik.
 ///
 /// `ambient` names the channel that measures the room, empty without one; it is an input and gets no
-/// estimate. `test_start_s`: rises and equilibrium times count from the level of each channel there, in
-/// `window`'s own time; the window itself may begin later, after a regime change (`start_level_C` then holds
-/// the channels' levels at the start of the test, by channel in the window's order, NaN where unknown; empty:
-/// the window's own start). The same window, options and seed give the same answer bit for bit. Pure: any
-/// thread. Errors (refuse_input): options out of bounds, no structural channel, unknown ambient, fewer than 8
-/// min of samples.
+/// estimate. Rises and equilibrium times count from `start_level_C` (by channel in the window's order, NaN
+/// where unknown) if the window begins after the start of the test, at a regime change; empty: from the
+/// window's own start. The same window, options and seed give the same answer bit for bit. Pure: any thread.
+/// Errors (refuse_input): options out of bounds, no structural channel, unknown ambient, fewer than 8 min of
+/// samples.
 Result<SpectrumEstimate> estimate_spectrum(const TestWindow& window, std::string_view ambient,
                                            const std::optional<SpectrumPrior>& prior,
                                            const SpectrumOptions& options, std::uint64_t seed,

@@ -1,0 +1,107 @@
+#include "channel_model.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+namespace thermbal {
+
+ChannelModel::ChannelModel(const ReducedChannel& channel, const Basis& basis, const BackgroundPrior& prior,
+                           double scale, const Eigen::VectorXd& functional)
+    : functional_(functional), scale_squared_(scale * scale) {
+    const Eigen::Index count = channel.rotated.size();
+    const Eigen::Index extra = basis.has_ambient ? 1 : 0;
+    rows_ = Eigen::MatrixXd::Zero(count + extra, basis.size());
+    rows_.topRows(count) = channel.reduced;
+    fine_ = Eigen::MatrixXd::Zero(count + extra, channel.reduced_fine.cols());
+    fine_.topRows(count) = channel.reduced_fine;
+    value_ = Eigen::VectorXd::Zero(count + extra);
+    value_.head(count) = channel.rotated;
+    noise_variance_ =
+        Eigen::VectorXd::Constant(count + extra, channel.sample_variance * channel.variance_inflation);
+    prior_mean_ = Eigen::VectorXd::Zero(basis.size());
+    prior_variance_ = Eigen::VectorXd::Zero(basis.size());
+    const double reach = 10.0 * (channel.range_C + 1.0);
+    prior_variance_[0] = reach * reach;
+    prior_variance_.segment(1, basis.grid()) = scale_squared_ * prior.level_profile;
+    if (basis.has_ambient) {
+        // In the end the channel follows the room: the gains' sum is one more observation.
+        rows_.row(count).tail(basis.grid()).setOnes();
+        value_[count] = 1.0;
+        noise_variance_[count] = prior.ambient_gain_sd * prior.ambient_gain_sd;
+        prior_mean_.tail(basis.grid()) = prior.ambient_mean;
+        prior_variance_.tail(basis.grid()) = prior.ambient_variance;
+    }
+    background_covariance_ = rows_ * prior_variance_.asDiagonal() * rows_.transpose();
+    background_covariance_.diagonal() += noise_variance_;
+    cross_ = rows_ * prior_variance_.cwiseProduct(functional_);
+    functional_variance_ = functional_.cwiseAbs2().dot(prior_variance_);
+    functional_mean_ = functional_.dot(prior_mean_);
+    value_ -= rows_ * prior_mean_;
+}
+
+WhitenedChannel ChannelModel::whitened() const {
+    const Eigen::LLT<Eigen::MatrixXd> factor(background_covariance_);
+    const Eigen::MatrixXd columns = factor.matrixL().solve(fine_);
+    WhitenedChannel whitened;
+    whitened.gram = columns.transpose() * columns;
+    whitened.projected = columns.transpose() * factor.matrixL().solve(value_);
+    whitened.scale_squared = scale_squared_;
+    return whitened;
+}
+
+Eigen::MatrixXd ChannelModel::columns_at(const std::vector<Mode>& modes) const {
+    Eigen::MatrixXd columns(fine_.rows(), static_cast<Eigen::Index>(modes.size()));
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+        const auto below = std::min(static_cast<Eigen::Index>(modes[k].position), fine_.cols() - 2);
+        const double share = modes[k].position - static_cast<double>(below);
+        columns.col(static_cast<Eigen::Index>(k)) =
+            (1.0 - share) * fine_.col(below) + share * fine_.col(below + 1);
+    }
+    return columns;
+}
+
+void ChannelModel::condition_on(const Eigen::MatrixXd& columns, const Eigen::VectorXd& variance) {
+    columns_ = columns;
+    mode_variance_ = scale_squared_ * variance;
+    Eigen::MatrixXd covariance = background_covariance_;
+    covariance.noalias() += columns_ * mode_variance_.asDiagonal() * columns_.transpose();
+    const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
+    factor_ = factor.matrixL();
+    dual_ = factor.solve(value_);
+}
+
+ConditionalValue ChannelModel::steady_state() const {
+    const Eigen::VectorXd cross = cross_ + columns_ * mode_variance_;
+    const Eigen::VectorXd half = factor_.triangularView<Eigen::Lower>().solve(cross);
+    const double prior_variance = functional_variance_ + mode_variance_.sum();
+    return {functional_mean_ + cross.dot(dual_), std::max(0.0, prior_variance - half.squaredNorm())};
+}
+
+Eigen::VectorXd ChannelModel::mean_background() const {
+    return prior_mean_ + prior_variance_.cwiseProduct(rows_.transpose() * dual_);
+}
+
+Eigen::VectorXd ChannelModel::mean_modes() const {
+    return mode_variance_.cwiseProduct(columns_.transpose() * dual_);
+}
+
+Eigen::VectorXd ChannelModel::draw(Random& random) const {
+    const Eigen::Index basis = rows_.cols();
+    const Eigen::Index modes = columns_.cols();
+    Eigen::VectorXd sample(basis + modes);
+    for (Eigen::Index k = 0; k < basis; ++k) sample[k] = std::sqrt(prior_variance_[k]) * random.normal();
+    for (Eigen::Index k = 0; k < modes; ++k)
+        sample[basis + k] = std::sqrt(mode_variance_[k]) * random.normal();
+    Eigen::VectorXd missed = value_ - rows_ * sample.head(basis) - columns_ * sample.tail(modes);
+    for (Eigen::Index k = 0; k < missed.size(); ++k)
+        missed[k] -= std::sqrt(noise_variance_[k]) * random.normal();
+    const Eigen::VectorXd half = factor_.triangularView<Eigen::Lower>().solve(missed);
+    const Eigen::VectorXd dual = factor_.triangularView<Eigen::Lower>().transpose().solve(half);
+    sample.head(basis) += prior_variance_.cwiseProduct(rows_.transpose() * dual) + prior_mean_;
+    sample.tail(modes) += mode_variance_.cwiseProduct(columns_.transpose() * dual);
+    return sample;
+}
+
+}  // namespace thermbal

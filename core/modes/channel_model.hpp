@@ -1,0 +1,70 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "design.hpp"
+#include "mode_sampler.hpp"
+#include "random.hpp"
+
+namespace thermbal {
+
+/// Priors of what is not a mode: the level, the response to the room, and a faint continuous background of
+/// time constants that stands for the many small modes of a body. All Gaussian, so they are marginalised
+/// exactly.
+struct BackgroundPrior {
+    Eigen::VectorXd
+        level_profile;  ///< of the background, per time constant of the basis, relative to scale squared
+    Eigen::VectorXd ambient_mean;  ///< empty without an ambient
+    Eigen::VectorXd ambient_variance;
+    double ambient_gain_sd = 0.05;
+};
+
+/// A steady state, or another linear function of the coefficients, given one state of the modes.
+struct ConditionalValue {
+    double mean = 0.0;
+    double variance = 0.0;
+};
+
+/// One channel's Gaussian model in the rotated frame of its samples.
+class ChannelModel {
+  public:
+    ChannelModel(const ReducedChannel& channel, const Basis& basis, const BackgroundPrior& prior,
+                 double scale, const Eigen::VectorXd& functional);
+
+    /// What the mode sampler needs.
+    WhitenedChannel whitened() const;
+
+    /// Sets the modes everything below is conditional on. `columns` are rotated step columns at the modes,
+    /// `variance` their prior variances relative to the squared scale.
+    void condition_on(const Eigen::MatrixXd& columns, const Eigen::VectorXd& variance);
+
+    Eigen::MatrixXd columns_at(const std::vector<Mode>& modes) const;
+    ConditionalValue steady_state() const;
+    Eigen::VectorXd mean_background() const;  ///< coefficients of the basis
+    Eigen::VectorXd mean_modes() const;       ///< amplitudes of the modes
+    /// One draw of all coefficients, basis first, by Matheron's rule.
+    Eigen::VectorXd draw(Random& random) const;
+
+  private:
+    Eigen::MatrixXd rows_;
+    Eigen::MatrixXd fine_;
+    Eigen::VectorXd value_;
+    Eigen::VectorXd noise_variance_;
+    Eigen::VectorXd prior_mean_;
+    Eigen::VectorXd prior_variance_;
+    Eigen::VectorXd functional_;
+    Eigen::MatrixXd background_covariance_;  // of the rows, noise included
+    Eigen::VectorXd cross_;                  // covariance of the rows with the functional, background only
+    double functional_variance_ = 0.0;
+    double functional_mean_ = 0.0;
+    double scale_squared_ = 1.0;
+
+    Eigen::MatrixXd columns_;
+    Eigen::VectorXd mode_variance_;
+    Eigen::MatrixXd factor_;  // lower triangle
+    Eigen::VectorXd dual_;    // covariance^-1 (value - prior mean)
+};
+
+}  // namespace thermbal
