@@ -30,9 +30,10 @@ class Body:
         if conductance_W_per_K > 0.0:
             self.links.append((a, b, conductance_W_per_K))
 
-    def surface(self, node, area_m2, kind, length_m):
+    def surface(self, node, area_m2, kind, length_m, depth_m2K_per_W=0.0):
+        """depth: the resistance of the half volume between the node and its surface."""
         if area_m2 > 0.0:
-            self.surfaces.append((node, area_m2, kind, length_m))
+            self.surfaces.append((node, area_m2, kind, length_m, depth_m2K_per_W))
 
     def box(self, size_m, cells, solid, material, exposed):
         """A ribbed casting as a box: `solid` of its volume is metal. `exposed` maps a face name (x-, x+, ...) to the
@@ -54,7 +55,7 @@ class Body:
                 face = "xyz"[axis] + name
                 kind = {"y-": "down", "y+": "up"}.get(face, "vertical")
                 for node in np.take(nodes, end, axis).ravel():
-                    self.surface(node, area * exposed.get(face, 0.0), kind, min(size_m))
+                    self.surface(node, area * exposed.get(face, 0.0), kind, min(size_m), 0.5 * d[axis] / k)
         return nodes
 
 
@@ -195,11 +196,11 @@ class Machine:
         zone = ["plain"] * nz
         for i in range(nz):
             z = (i + 0.5) / nz
-            if 0.04 < z < 0.20:
+            if 1 / 16 < z < 3 / 16:
                 zone[i] = "front"
-            elif 0.78 < z < 0.90:
+            elif 12 / 16 < z < 14 / 16:
                 zone[i] = "rear"
-            elif d.integrated_motor and 0.35 < z < 0.65:
+            elif d.integrated_motor and 6 / 16 < z < 10 / 16:
                 zone[i] = "motor"
         r_in, r_shaft = d.shaft_r_m
         r_ring, r_bore = r_shaft + d.ring_m, r_shaft + 2 * d.ring_m
@@ -249,7 +250,7 @@ class Machine:
         body.surface(nose, 2 * np.pi * 1.6 * r_shaft * 0.09, "rotating", 3.2 * r_shaft)
         body.surface(cells["shaft0"][-1], 2 * np.pi * r_shaft * 0.12, "rotating", 2 * r_shaft)
         self.nose, self.sleeve, self.inner_sleeve = nose, cells["sleeve1"], cells["sleeve0"]
-        self.cooled = [cells["sleeve1"][i] for i in range(nz) if 0.2 < (i + 0.5) / nz < 0.75]
+        self.cooled = [cells["sleeve1"][i] for i in range(nz) if 3 / 16 < (i + 0.5) / nz < 12 / 16]
         if d.integrated_motor:
             self.rotor = [cells["inner"][i] for i in range(nz) if zone[i] == "motor"]
             self.stator = [cells["outer"][i] for i in range(nz) if zone[i] == "motor"]
@@ -271,9 +272,9 @@ class Machine:
     # -- surfaces and heat ------------------------------------------------------------------------------------------
 
     def _surfaces(self, surfaces):
-        node, area, kind, length = zip(*surfaces)
+        node, area, kind, length, depth = zip(*surfaces)
         kind, length = np.array(kind), np.array(length)
-        self.s_node, self.s_area = np.array(node), np.array(area)
+        self.s_node, self.s_area, self.s_depth = np.array(node), np.array(area), np.array(depth)
         # Simplified laminar free convection of air; turbulent for the big walls (Incropera, McAdams).
         tall = (kind == "vertical") & (length >= 0.45)
         self.s_c = np.select([tall, kind == "vertical", kind == "up", kind == "down"],
@@ -311,6 +312,7 @@ class Machine:
         Ts = T[self.s_node]
         if d.linear:
             h = 1.2 * self.s_c + forced + 4 * d.emissivity * SIGMA * 295.0 ** 3
+            h = h / (1 + h * self.s_depth)
             return self.s_area * h * (room_C - Ts), self.s_area * h
         diff = np.sqrt((Ts - room_C) ** 2 + 0.04)
         natural = self.s_c * diff ** self.s_n
@@ -318,8 +320,8 @@ class Machine:
         slope = (natural / h) ** 2 * natural * self.s_n
         Tk, Tak = Ts + 273.15, room_C + 273.15
         radiated = d.emissivity * SIGMA * (Tk ** 4 - Tak ** 4)
-        flow = self.s_area * (h * (room_C - Ts) - radiated)
-        return flow, self.s_area * (h + slope + 4 * d.emissivity * SIGMA * Tk ** 3)
+        area = self.s_area / (1 + self.s_depth * (h + 4 * d.emissivity * SIGMA * Tk ** 3))
+        return area * (h * (room_C - Ts) - radiated), area * (h + slope + 4 * d.emissivity * SIGMA * Tk ** 3)
 
     def heat(self, means, regime, since_start_s):
         """Heat of the six places (W): front bearings, rear bearings, stator, rotor, tool side, bed."""

@@ -305,7 +305,7 @@ def machine_run(rng, group, condition=None):
         chiller = float(rng.uniform(8, 40))
         coolant = Coolant(room.level_C + float(rng.uniform(-1.0, 2.0)), float(rng.uniform(0.3, 2.0)), float(rng.uniform(240, 1200)))
     kind = {"linear": "linear", "nonlinear_friction": "nonlinear", "slow_machine": "slow"}.get(group, "ordinary")
-    minutes = (330, 700) if group == "slow_machine" else (70, 180) if rng.random() < 0.6 else (150, 280)
+    minutes = (330, 700) if group == "slow_machine" else [(70, 180), (150, 280), (250, 370)][rng.choice(3, p=[0.45, 0.35, 0.2])]
     if group == "chiller":
         minutes = (30, 280)
     if group in ("speed_step", "stop_restart", "door_jump"):

@@ -9,6 +9,7 @@ moment of it (the room and the regime of then), and a declaration counts with th
 import argparse
 import json
 import math
+import shlex
 import shutil
 import subprocess
 import sys
@@ -32,7 +33,7 @@ def replay(csv, args):
     """The replay's JSON, or {"failure": why}. It sees a copy of the CSV alone, never the truth beside it."""
     with tempfile.TemporaryDirectory() as alone:
         copy = shutil.copy(csv, Path(alone) / "test.csv")
-        command = [*args.thermbalctl.split(), "replay", str(copy), "--tolerance-C", str(args.tolerance_C),
+        command = [*shlex.split(args.thermbalctl), "replay", str(copy), "--tolerance-C", str(args.tolerance_C),
                    "--every-min", str(args.every_min), "--json", *args.replay_arg]
         began = time.monotonic()
         try:
@@ -83,7 +84,8 @@ def judge(truth, name, said, stopped_at):
     c = truth.channels[name]
     row = {"file": truth.file, "group": truth.group, "channel": name, "state": c["state"], "declarable": c["declarable"],
            "declared": bool(said and said.get("declared")), "rise_C": c["rise_C"], "reason": (said or {}).get("reason")}
-    at = number(said.get("declared_at_min")) if row["declared"] else stopped_at if stopped_at is not None else WHOLE_TEST_MIN
+    end = stopped_at if stopped_at is not None else WHOLE_TEST_MIN
+    at = number(said.get("declared_at_min")) if row["declared"] else end
     row["complaint"] = complaint(row["declared"], said, at)
     if row["declared"] and at is None:
         at = WHOLE_TEST_MIN
@@ -161,6 +163,7 @@ def figures(runs):
     right = [r for r in declarable if r["declared"] and not r["wrong"] and r["at_min"] < WHOLE_TEST_MIN]
     ratios = [r["ratio"] for r in right if r["ratio"]]
     never = [r["ratio"] if r["declared"] and not r["wrong"] and r["ratio"] else math.inf for r in declarable if r["limit_min"]]
+    middle = sorted(never)[len(never) // 2] if never else math.inf
     open_rows = [r for r in rows if not r["declared"] and r["held"] is not None and r["state"] in ("live", "barely_warming")]
     eq = [abs(r["equilibrium_error"]) for r in declared if r.get("equilibrium_error") is not None]
     stops = [(run["stopped_at_min"] if run["stopped_at_min"] is not None else WHOLE_TEST_MIN) / WHOLE_TEST_MIN for run in runs]
@@ -171,10 +174,10 @@ def figures(runs):
         "held_undeclared": share(sum(r["held"] for r in open_rows), len(open_rows)),
         "half_width_C": quantile([r["half_width_C"] for r in declared if r["half_width_C"] is not None], 0.5),
         "ratio_median": quantile(ratios, 0.5), "ratio_p90": quantile(ratios, 0.9),
-        "ratio_median_undeclared_never": quantile(never, 0.5) if never and np.isfinite(np.median(never)) else None,
+        "ratio_median_undeclared_never": middle if math.isfinite(middle) else None,
         "rightly_declared": share(len(right), len(declarable)),
         "stop_share_mean": float(np.mean(stops)) if stops else None,
-        "stop_share_by_group_needs_all": share(sum(run["stopped_at_min"] is not None for run in runs), len(runs)),
+        "stopped": share(sum(run["stopped_at_min"] is not None for run in runs), len(runs)),
         "rms_error_C": float(np.sqrt(np.mean(np.square(errors)))) if errors else None,
         "bias_C": float(np.mean(errors)) if errors else None,
         "equilibrium_error_median": quantile(eq, 0.5), "equilibrium_error_p90": quantile(eq, 0.9),
@@ -218,7 +221,7 @@ def table(total, groups, paper, args):
     worst = min(held_groups.items(), key=lambda kv: kv[1]["share"], default=(None, {"share": None, "hits": 0, "of": 0}))
     changes = total["after_change"] + total["left_standing"]
     lines = [
-        ("declared, error over max(0.3 C, 5 %)", f"{text(wrong and 100 * wrong, '{:.2f}') if wrong else ('0.00' if wrong == 0 else '-')} % "
+        ("declared, error over max(0.3 C, 5 %)", f"{text(None if wrong is None else 100 * wrong, '{:.2f}')} % "
          f"({total['wrong']['hits']} of {total['wrong']['of']})", "< 1 %", "0",
          "no figure" if wrong is None else "aim" if wrong == 0 else "must" if wrong < 0.01 else "MISSED"),
         ("90 % intervals hold the truth, all", f"{text(held)} [{text(total['held']['low'])}, {text(total['held']['high'])}]",

@@ -20,9 +20,9 @@ class Truth:
     def settle_C(self, channel, at_min, regime=None):
         """Where the channel settles while the room stays at its mean over the 15 min before `at_min`."""
         regime = self.regime_at(at_min) if regime is None else regime
-        row = min(int(round(at_min / self.raw["room_mean_step_min"])), len(self.raw["room_mean_15min_C"]) - 1)
-        return float(np.interp(self.raw["room_mean_15min_C"][row], self.raw["room_grid_C"],
-                               self.channels[channel]["settle_C"][regime]))
+        means = self.raw["room_mean_15min_C"]
+        room_C = np.interp(at_min, self.raw["room_mean_step_min"] * np.arange(len(means)), means)
+        return float(np.interp(room_C, self.raw["room_grid_C"], self.channels[channel]["settle_C"][regime]))
 
     def start_C(self, channel):
         c = self.channels[channel]
