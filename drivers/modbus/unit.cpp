@@ -10,8 +10,8 @@ namespace {
 void decode_block(const ModuleProfile& profile, const BlockRead& block,
                   std::span<const std::uint16_t> registers, std::vector<Sample>& samples) {
     for (int i = 0; i < block.inputs; ++i) {
-        const auto at = std::min(registers.size(),
-                                 static_cast<std::size_t>(i) * static_cast<std::size_t>(profile.stride));
+        const auto input = static_cast<std::size_t>(i);
+        const std::size_t at = std::min(registers.size(), input * static_cast<std::size_t>(profile.stride));
         samples[static_cast<std::size_t>(block.first_input + i)] = decode(profile, registers.subspan(at));
     }
 }
