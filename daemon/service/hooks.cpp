@@ -12,7 +12,7 @@
 #include <signal.h>
 #include <spawn.h>
 #include <sys/epoll.h>
-#include <sys/pidfd.h>
+#include <sys/syscall.h>
 #include <sys/timerfd.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -177,7 +177,7 @@ Result<void> HookRunner::run(const Hook& hook, Done done) {
         return fail(passing ? NextStep::retry : NextStep::refuse_input,
                     fmt::format("hook {}: cannot be started: {}", hook.argv.front(), reason(code)));
     }
-    running.process = Descriptor(pidfd_open(running.pid, 0));
+    running.process = Descriptor(static_cast<int>(syscall(SYS_pidfd_open, running.pid, 0)));
     set_timer(running.timer.get(), std::max(hook.timeout, std::chrono::milliseconds(1)));
     const auto id = parts_->next_id++;
     const bool watched = running.process.valid() && parts_->watch(running.process.get(), id, Event::ended) &&

@@ -90,8 +90,8 @@ CREATE TABLE declarations (
   steady_state_low_C REAL,
   steady_state_high_C REAL,
   equilibrium_time_min REAL,
-  rmse_by_n_C TEXT NOT NULL CHECK (json_valid(rmse_by_n_C)),
-  basis TEXT NOT NULL CHECK (json_valid(basis)),
+  rmse_by_n_C TEXT NOT NULL,
+  basis TEXT NOT NULL,
   version TEXT NOT NULL,
   PRIMARY KEY (test_id, channel),
   FOREIGN KEY (test_id, channel) REFERENCES channels,
@@ -103,7 +103,7 @@ CREATE TABLE identifications (
   channel INTEGER NOT NULL,
   window_end_scan INTEGER NOT NULL,
   wall_ns INTEGER NOT NULL,
-  verdict TEXT NOT NULL CHECK (json_valid(verdict)),
+  verdict TEXT NOT NULL,
   PRIMARY KEY (test_id, channel, window_end_scan),
   FOREIGN KEY (test_id, channel) REFERENCES channels,
   FOREIGN KEY (test_id, window_end_scan) REFERENCES scans
@@ -133,7 +133,7 @@ CREATE TABLE archive (
   machine TEXT NOT NULL,
   test_id INTEGER REFERENCES tests,
   created_wall_ns INTEGER NOT NULL,
-  spectrum TEXT NOT NULL CHECK (json_valid(spectrum))
+  spectrum TEXT NOT NULL
 ) STRICT;
 CREATE INDEX archive_of_a_machine ON archive (machine, id);
 )sql";

@@ -174,6 +174,12 @@ std::string curve_json(const std::vector<double>& curve) {
     return nlohmann::json(curve).dump();
 }
 
+/// Checked here and not by the schema: SQLite's JSON functions are not trusted in one.
+Result<void> check_json(std::string_view what, const std::string& text) {
+    if (nlohmann::json::accept(text)) return {};
+    return fail(NextStep::refuse_input, fmt::format("{}: not JSON: {:.60}", what, text));
+}
+
 bool may_follow(TestState from, TestState to) {
     switch (from) {
         case TestState::running:
@@ -295,6 +301,7 @@ Result<void> Store::append_scans(TestId id, std::span<const ScanRecord> scans) {
 Result<void> Store::record_declaration(TestId id, const DeclarationRecord& declaration) {
     auto& database = parts_->database();
     return in_transaction(database, [&]() -> Result<void> {
+        if (auto valid = check_json("declaration", declaration.basis_json); !valid) return valid;
         const auto channel = channel_position(database, id, declaration.channel);
         if (!channel) return std::unexpected(channel.error());
         return database.run(
@@ -313,6 +320,7 @@ Result<void> Store::record_identifications(TestId id, std::span<const Identifica
     auto& database = parts_->database();
     return in_transaction(database, [&]() -> Result<void> {
         for (const auto& identification : identifications) {
+            if (auto valid = check_json("identification", identification.verdict_json); !valid) return valid;
             const auto channel = channel_position(database, id, identification.channel);
             if (!channel) return std::unexpected(channel.error());
             if (auto done = database.run("INSERT OR REPLACE INTO identifications (test_id, channel, "
@@ -339,6 +347,8 @@ Result<std::int64_t> Store::record_event(const EventRecord& event) {
 
 Result<std::int64_t> Store::record_archive(const ArchiveRecord& archive) {
     auto& database = parts_->database();
+    if (auto valid = check_json("archive", archive.spectrum_json); !valid)
+        return std::unexpected(valid.error());
     if (auto done = database.run(
             "INSERT INTO archive (machine, test_id, created_wall_ns, spectrum) VALUES (?, ?, ?, ?)",
             archive.machine, archive.test_id, archive.created_wall_ns, archive.spectrum_json);

@@ -59,6 +59,11 @@ constexpr RowCheck row_checks[] = {
      "WHERE (quality = 'good') <> (value_C IS NOT NULL)"},
     {"SELECT s.test_id, 'scan ' || s.scan || ' was missed, and channel ' || s.channel || ' has a reading' "
      "FROM samples s JOIN scans g USING (test_id, scan) WHERE g.status = 'missed' AND s.quality = 'good'"},
+    {"SELECT test_id, 'the declaration of channel ' || channel || ' holds no JSON' FROM declarations "
+     "WHERE NOT json_valid(rmse_by_n_C) OR NOT json_valid(basis)"},
+    {"SELECT test_id, 'the identification of channel ' || channel || ' at scan ' || window_end_scan || ' "
+     "holds no JSON' "
+     "FROM identifications WHERE NOT json_valid(verdict)"},
     {"SELECT id, 'ended before it started' FROM tests WHERE ended_monotonic_ns < started_monotonic_ns "
      "AND ended_wall_ns < started_wall_ns"},
 };

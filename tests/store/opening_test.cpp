@@ -1,0 +1,227 @@
+#include <array>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "store/store.hpp"
+#include "support.hpp"
+
+namespace thermbal::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class OpeningTest : public ::testing::Test {
+  protected:
+    Folder folder;
+    std::filesystem::path path = folder / "thermbal.db";
+};
+
+std::string output_of(const std::string& command) {
+    std::string text;
+    const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen((command + " 2>&1").c_str(), "r"), pclose);
+    std::array<char, 4096> buffer;
+    while (const auto count = fread(buffer.data(), 1, buffer.size(), pipe.get()))
+        text.append(buffer.data(), count);
+    return text;
+}
+
+TEST_F(OpeningTest, TheDatabaseIsDurableStrictAndNotForEveryone) {
+    const auto store = open_store(path);
+    Direct direct(path);
+    EXPECT_EQ(direct.integer("SELECT journal_mode = 'wal' FROM pragma_journal_mode"), 1);
+    EXPECT_EQ(direct.integer("PRAGMA user_version"), 2);
+    EXPECT_EQ(
+        direct.integer("SELECT count(*) FROM pragma_table_list WHERE schema = 'main' AND type = 'table' AND "
+                       "name NOT LIKE 'sqlite_%' AND NOT strict"),
+        0);
+    EXPECT_GE(direct.integer("SELECT count(*) FROM pragma_table_list WHERE strict"), 9);
+    struct stat file{};
+    ASSERT_EQ(stat(path.c_str(), &file), 0);
+    EXPECT_EQ(file.st_mode & 0007U, 0U);
+}
+
+TEST_F(OpeningTest, ASecondWriterIsRefusedAndToldWhoHasIt) {
+    const auto first = open_store(path);
+    const auto second = Store::open(path, start);
+    ASSERT_FALSE(second);
+    EXPECT_EQ(second.error().next, NextStep::refuse_input);
+    EXPECT_THAT(second.error().message, HasSubstr(fmt::format("process {}", getpid())));
+
+    const pid_t child = fork();
+    if (child == 0) {
+        const auto other = Store::open(path, start);
+        _exit(!other && other.error().next == NextStep::refuse_input ? 0 : 1);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    EXPECT_EQ(status, 0);
+}
+
+TEST_F(OpeningTest, TheLockGoesWithTheStore) {
+    {
+        const auto first = open_store(path);
+    }
+    EXPECT_TRUE(Store::open(path, start));
+}
+
+TEST_F(OpeningTest, AnOlderDatabaseIsBroughtUpWithAllItHolds) {
+    {
+        Direct direct(path);
+        const auto sql =
+            contents(std::filesystem::path(THERMBAL_SOURCE_DIR) / "tests/store/fixtures/version_1.sql");
+        ASSERT_EQ(direct.run(sql), SQLITE_OK) << direct.message();
+        ASSERT_EQ(direct.integer("PRAGMA user_version"), 1);
+    }
+    const auto too_old = Reader::open(path);
+    ASSERT_FALSE(too_old);
+    EXPECT_THAT(too_old.error().message, HasSubstr("schema version 1"));
+
+    auto store = open_store(path);
+    const auto resumed = store.resume();
+    ASSERT_OK(resumed);
+    ASSERT_TRUE(resumed->has_value());
+    EXPECT_EQ((*resumed)->test.record.name, "from version 1");
+    ASSERT_EQ((*resumed)->scans.size(), 2U);
+    EXPECT_EQ((*resumed)->scans[1].samples[1].quality, Quality::open);
+    ASSERT_OK(store.append_scan((*resumed)->test.id, scan_record(2, 2)));
+    EXPECT_THAT(*store.read().archive(""), IsEmpty());
+    ASSERT_OK(store.record_archive({}));
+    EXPECT_THAT(findings_text(*store.read().verify()), IsEmpty());
+}
+
+TEST_F(OpeningTest, AMigratedDatabaseHasTheSchemaOfANewOne) {
+    const auto fresh = folder / "fresh.db";
+    {
+        Direct direct(path);
+        ASSERT_EQ(direct.run(contents(std::filesystem::path(THERMBAL_SOURCE_DIR) /
+                                      "tests/store/fixtures/version_1.sql")),
+                  SQLITE_OK);
+    }
+    {
+        const auto migrated = open_store(path);
+    }
+    {
+        const auto created = open_store(fresh);
+    }
+    Direct direct(path);
+    ASSERT_EQ(direct.run("ATTACH '" + fresh.string() + "' AS fresh"), SQLITE_OK);
+    EXPECT_EQ(direct.integer("SELECT count(*) FROM (SELECT type, name, sql FROM main.sqlite_schema EXCEPT "
+                             "SELECT type, name, sql FROM fresh.sqlite_schema)"),
+              0);
+    EXPECT_EQ(direct.integer("SELECT count(*) FROM (SELECT type, name, sql FROM fresh.sqlite_schema EXCEPT "
+                             "SELECT type, name, sql FROM main.sqlite_schema)"),
+              0);
+}
+
+TEST_F(OpeningTest, ANewerDatabaseIsRefusedAndLeftAlone) {
+    {
+        const auto store = open_store(path);
+    }
+    {
+        Direct(path).run("PRAGMA user_version = 3");
+    }
+    const auto before = contents(path);
+    for (const auto& message :
+         {Store::open(path, start).error().message, Reader::open(path).error().message}) {
+        EXPECT_THAT(message, HasSubstr("schema version 3"));
+        EXPECT_THAT(message, HasSubstr("newer thermbald"));
+    }
+    EXPECT_EQ(contents(path), before);
+}
+
+TEST_F(OpeningTest, SomebodyElsesFileIsRefusedAndLeftAlone) {
+    {
+        Direct(path).run("CREATE TABLE recipes (name TEXT)");
+    }
+    EXPECT_THAT(Store::open(path, start).error().message, HasSubstr("not a database of thermbald"));
+    EXPECT_THAT(Reader::open(path).error().message, HasSubstr("not a database of thermbald"));
+
+    const auto text = folder / "letter.txt";
+    std::ofstream(text) << "Dear reader, this is not a database at all.\n";
+    const auto result = Store::open(text, start);
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().next, NextStep::refuse_input);
+    EXPECT_EQ(contents(text), "Dear reader, this is not a database at all.\n");
+    EXPECT_FALSE(Reader::open(folder / "absent.db"));
+    EXPECT_FALSE(std::filesystem::exists(folder / "absent.db"));
+    EXPECT_THAT(Store::open("/nonexistent/thermbal.db", start).error().message,
+                HasSubstr("folder must exist"));
+}
+
+TEST_F(OpeningTest, ADamagedDatabaseIsSetAsideWhole) {
+    {
+        auto store = open_store(path);
+        const auto id = store.begin_test(test_record());
+        for (std::int64_t k = 0; k < 200; ++k) ASSERT_OK(store.append_scan(*id, scan_record(k)));
+    }
+    {
+        std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+        for (int page = 10; page < 14; ++page) {
+            file.seekp(page * 4096);
+            file << std::string(4096, '\x5a');
+        }
+    }
+    const auto damaged = contents(path);
+    const auto kept = Store::open(path, start, {.set_aside_damaged = false});
+    ASSERT_FALSE(kept);
+    EXPECT_EQ(kept.error().next, NextStep::stop);
+    EXPECT_EQ(contents(path), damaged);
+
+    const auto store = open_store(path);
+    ASSERT_TRUE(store.set_aside().has_value());
+    EXPECT_THAT(store.set_aside()->string(), HasSubstr("thermbal.db.damaged-20231114T221320Z"));
+    EXPECT_EQ(contents(*store.set_aside()), damaged);
+    EXPECT_THAT(*store.read().tests(), IsEmpty());
+}
+
+TEST_F(OpeningTest, OtherProgramsReadIt) {
+    auto store = open_store(path);
+    const auto id = store.begin_test(test_record());
+    for (std::int64_t k = 0; k < 4; ++k) ASSERT_OK(store.append_scan(*id, scan_record(k)));
+    const std::string sql =
+        "SELECT channel, count(*), max(value_C) FROM readings WHERE channel = 'T5' GROUP BY channel";
+    const auto python = output_of(std::string(THERMBAL_PYTHON) +
+                                  " -c \"import sqlite3; c = sqlite3.connect('file:" + path.string() +
+                                  "?mode=ro', uri=True); print(c.execute(\\\"" + sql + "\\\").fetchall())\"");
+    EXPECT_EQ(python, "[('T5', 4, 18.403)]\n");
+    if (std::filesystem::exists("/usr/bin/sqlite3")) {
+        EXPECT_EQ(output_of("/usr/bin/sqlite3 -readonly " + path.string() + " \"" + sql + "\""),
+                  "T5|4|18.403\n");
+    }
+}
+
+TEST_F(OpeningTest, AnotherUserReadsItWithAndWithoutTheDaemon) {
+    if (geteuid() != 0) GTEST_SKIP() << "needs root to become another user";
+    const auto reads_as_another_user = [&] {
+        const pid_t child = fork();
+        if (child == 0) {
+            if (setgid(65534) != 0 || setuid(65534) != 0) _exit(3);
+            const auto reader = Reader::open(path);
+            if (!reader) fprintf(stderr, "%s\n", reader.error().message.c_str());
+            _exit(reader && reader->tests() && reader->tests()->size() == 1 ? 0 : 1);
+        }
+        int status = 0;
+        waitpid(child, &status, 0);
+        return status == 0;
+    };
+    {
+        auto store = open_store(path);
+        ASSERT_OK(store.begin_test(test_record()));
+        ASSERT_EQ(chmod(path.parent_path().c_str(), 0755), 0);
+        for (const char* suffix : {"", "-wal", "-shm"})
+            ASSERT_EQ(chmod((path.string() + suffix).c_str(), 0644), 0);
+        EXPECT_TRUE(reads_as_another_user());
+    }
+    EXPECT_TRUE(reads_as_another_user()) << "after the daemon has ended";
+}
+
+}  // namespace
+}  // namespace thermbal::test
