@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstdio>
-#include <cstring>
-#include <memory>
+#include <fstream>
+#include <sstream>
 #include <system_error>
 #include <utility>
 
@@ -14,19 +13,14 @@ namespace thermbal {
 namespace {
 
 Result<std::string> read_text(const std::string& path) {
-    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
-    const auto refuse = [&path](int error) {
-        return fail(NextStep::refuse_input,
-                    fmt::format("{}: cannot be read ({}); give a recorded test in CSV", path,
-                                std::generic_category().message(error)));
-    };
-    if (!file) return refuse(errno);
-    std::string text;
-    char block[65536];
-    std::size_t got = 0;
-    while ((got = std::fread(block, 1, sizeof block, file.get())) > 0) text.append(block, got);
-    if (std::ferror(file.get()) != 0) return refuse(errno);
-    return text;
+    std::ifstream file(path, std::ios::binary);
+    std::ostringstream text;
+    // A folder opens, and gives no character; an empty file gives none either, and the parser says what it
+    // lacks.
+    if (file.is_open()) text << file.rdbuf();
+    if (file.is_open() && !file.bad()) return std::move(text).str();
+    return fail(NextStep::refuse_input, fmt::format("{}: cannot be read ({}); give a recorded test in CSV",
+                                                    path, std::generic_category().message(errno)));
 }
 
 }  // namespace
@@ -68,6 +62,7 @@ std::vector<double> RecordedScans::row(std::size_t scan) const {
 
 std::vector<std::string> RecordedScans::channels() const {
     std::vector<std::string> names;
+    names.reserve(test_.channels.size());
     for (const Column& channel : test_.channels) names.push_back(channel.name);
     return names;
 }

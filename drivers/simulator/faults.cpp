@@ -81,7 +81,7 @@ Result<void> read_target(Fault& fault, std::string_view target, std::string_view
     const auto unit = number<std::uint8_t>(target);
     if (!unit || *unit < 1 || *unit > 247)
         return refuse(text, "a fault of the line acts on a unit 1 ... 247");
-    fault.unit = *unit;
+    fault.unit = unit;
     return {};
 }
 

@@ -21,7 +21,8 @@ double uniform(std::uint64_t bits) {
 double rounded(double value, double step) {
     const double steps_per_one = std::round(1.0 / step);
     // 0.1 is no binary number, 10 is: dividing by it gives the double that is nearest to the decimal.
-    if (std::abs(steps_per_one * step - 1.0) < 1e-12) return std::round(value * steps_per_one) / steps_per_one;
+    if (std::abs(steps_per_one * step - 1.0) < 1e-12)
+        return std::round(value * steps_per_one) / steps_per_one;
     return std::round(value / step) * step;
 }
 

@@ -10,6 +10,7 @@ namespace {
 std::vector<std::pair<std::uint16_t, std::uint16_t>> repeated(std::uint16_t first, std::uint16_t stride,
                                                               std::uint16_t count, std::uint16_t value) {
     std::vector<std::pair<std::uint16_t, std::uint16_t>> constants;
+    constants.reserve(count);
     for (std::uint16_t i = 0; i < count; ++i) {
         constants.emplace_back(static_cast<std::uint16_t>(first + i * stride), value);
     }

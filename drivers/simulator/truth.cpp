@@ -41,6 +41,7 @@ struct Crossing {
 
 std::vector<Crossing> crossings_to_find(const std::vector<double>& settled_C, double room_C) {
     std::vector<Crossing> crossings;
+    crossings.reserve(settled_C.size());
     for (const double settled : settled_C) {
         crossings.push_back({.target_C = room_C + 0.95 * (settled - room_C),
                              .open = std::abs(settled - room_C) > least_rise_C});
@@ -95,6 +96,7 @@ Result<Truth> plant_truth(const PlantDescription& description, double room_C, co
     if (!settled) return std::unexpected(settled.error());
 
     std::vector<double> sensor_settled_C;
+    sensor_settled_C.reserve(description.sensors.size());
     for (const PlantSensor& sensor : description.sensors) {
         sensor_settled_C.push_back(sensor.node == PlantSensor::room ? room_C : (*settled)[sensor.node]);
     }
