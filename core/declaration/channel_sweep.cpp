@@ -1,0 +1,68 @@
+#include "channel_sweep.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "series/sample.hpp"
+
+namespace thermbal {
+namespace {
+
+/// When `curve_C` first reaches 95 % of the way from its first value to the steady state; NaN if it never does.
+double equilibrium_time_min(std::span<const double> curve_C, double steady_state_C, double start_s, double period_s) {
+    const double start_C = curve_C.front();
+    const double target_C = start_C + 0.95 * (steady_state_C - start_C);
+    const double sign = steady_state_C >= start_C ? 1.0 : -1.0;
+    for (std::size_t k = 1; k < curve_C.size(); ++k) {
+        if (sign * (curve_C[k] - target_C) < 0.0) continue;
+        const double step_C = curve_C[k] - curve_C[k - 1];
+        const double part = step_C == 0.0 ? 0.0 : (target_C - curve_C[k - 1]) / step_C;
+        return (start_s + (static_cast<double>(k) - 1.0 + std::clamp(part, 0.0, 1.0)) * period_s) / 60.0;
+    }
+    return no_value;
+}
+
+Result<SvrPrediction> predict_at(const LagFit& fit, std::span<const double> filtered_C, double start_s, double period_s,
+                                 const SweepOptions& options) {
+    SvrPrediction svr{static_cast<int>(fit.n), no_value, no_value, fit.C, fit.sigma};
+    if (!fit.settles) return svr;
+    svr.steady_state_C = fit.steady_state_C;
+    const std::size_t horizon = fit.settled_after + 1;
+    const auto prediction = predict(filtered_C, fit.n, fit.C, fit.sigma, horizon, options);
+    if (!prediction) return std::unexpected(prediction.error());
+    std::vector<double> curve_C(filtered_C.begin(), filtered_C.end());
+    curve_C.insert(curve_C.end(), prediction->predicted_C.begin(), prediction->predicted_C.end());
+    svr.equilibrium_time_min = equilibrium_time_min(curve_C, fit.steady_state_C, start_s, period_s);
+    return svr;
+}
+
+}  // namespace
+
+Result<ChannelSweep> sweep_channel(std::span<const double> samples_C, double start_s, double period_s,
+                                   const FlowOptions& options, const ParallelFor& parallel_for,
+                                   const std::function<bool()>& cancelled) {
+    const auto marked = mark_outliers(samples_C, options.outliers);
+    if (!marked) return std::unexpected(marked.error());
+    const auto filled = fill_short_gaps(marked->values_C, options.gaps);
+    if (!filled) return std::unexpected(filled.error());
+    const auto filtered = denoise(filled->values_C, options.filter);
+    if (!filtered) return std::unexpected(filtered.error());
+    const std::vector<double>& filtered_C = filtered->values_C;
+    const auto swept = sweep(filtered_C, options.sweep, parallel_for, cancelled);
+    if (!swept) return std::unexpected(swept.error());
+
+    ChannelSweep result;
+    for (const LagFit& fit : swept->by_lag) result.rmse_by_n_C.push_back(fit.window_rmse_C);
+    result.minimum = find_minimum(result.rmse_by_n_C, options.criterion);
+    if (result.minimum.n > 0) {
+        const LagFit& fit = swept->by_lag[static_cast<std::size_t>(result.minimum.n) - 1];
+        const double first_s = start_s + static_cast<double>(filled->first) * period_s;
+        auto svr = predict_at(fit, filtered_C, first_s, period_s, options.sweep);
+        if (!svr) return std::unexpected(svr.error());
+        result.svr = *svr;
+    }
+    return result;
+}
+
+}  // namespace thermbal

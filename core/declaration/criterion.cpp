@@ -1,0 +1,60 @@
+#include "declaration/criterion.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace thermbal {
+namespace {
+
+double median(std::vector<double> values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::ranges::nth_element(values, middle);
+    if (values.size() % 2 == 1) return *middle;
+    return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+double roughness(const std::vector<double>& y) {
+    std::vector<double> bends;
+    for (std::size_t i = 1; i + 1 < y.size(); ++i) bends.push_back(std::abs(y[i - 1] - 2.0 * y[i] + y[i + 1]));
+    constexpr double sd_of_mad = 1.4826;
+    return bends.empty() ? 0.0 : sd_of_mad * median(bends) / std::sqrt(6.0);
+}
+
+}  // namespace
+
+RmseMinimum find_minimum(std::span<const double> rmse_by_n_C, const CriterionOptions& options) {
+    RmseMinimum found;
+    found.guard.name = "clear_minimum";
+    std::vector<double> y;  // of the usable n, in their order
+    std::vector<int> lags;
+    for (std::size_t i = 0; i < rmse_by_n_C.size(); ++i) {
+        if (!std::isfinite(rmse_by_n_C[i]) || rmse_by_n_C[i] <= 0.0) continue;
+        y.push_back(std::log(rmse_by_n_C[i]));
+        lags.push_back(static_cast<int>(i) + 1);
+    }
+    if (static_cast<int>(y.size()) < options.min_lags) {
+        found.guard.figures =
+            fmt::format("{} of {} numbers of lags give a free run that stays bounded, {} are needed for a curve",
+                        y.size(), rmse_by_n_C.size(), options.min_lags);
+        return found;
+    }
+    const auto lowest = static_cast<std::size_t>(std::ranges::min_element(y) - y.begin());
+    found.n = lags[lowest];
+    found.rmse_C = std::exp(y[lowest]);
+    found.depth = median(y) - y[lowest];
+    found.scatter = roughness(y);
+    found.at_edge = found.n == 1 || found.n == static_cast<int>(rmse_by_n_C.size());
+    found.clear = !found.at_edge && found.depth >= options.min_depth &&
+                  found.depth >= options.min_depth_in_scatters * found.scatter;
+    found.guard.passed = found.clear;
+    found.guard.figures = fmt::format(
+        "RMSE {:.3f} C at n = {}{}, {:.2f} below the curve in ln (needed {:.2f} and {:.1f} x its scatter {:.2f})",
+        found.rmse_C, found.n, found.at_edge ? " (the edge of the curve)" : "", found.depth, options.min_depth,
+        options.min_depth_in_scatters, found.scatter);
+    return found;
+}
+
+}  // namespace thermbal

@@ -1,0 +1,195 @@
+#include "guards.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "series/sample.hpp"
+
+namespace thermbal {
+namespace {
+
+const ChannelEstimate* estimate_of(const SpectrumEstimate* estimate, const std::string& channel) {
+    if (estimate == nullptr) return nullptr;
+    const auto found = std::ranges::find(estimate->channels, channel, &ChannelEstimate::channel);
+    return found == estimate->channels.end() ? nullptr : &*found;
+}
+
+double last_good(std::span<const double> values) {
+    for (std::size_t i = values.size(); i-- > 0;) {
+        if (std::isfinite(values[i])) return values[i];
+    }
+    return no_value;
+}
+
+Guard enough_samples(const Evidence& evidence, const GuardOptions& options) {
+    const double window_min = (evidence.window.end_s() - evidence.window.start_s) / 60.0;
+    const auto good = std::ranges::count_if(evidence.samples.values, [](double value) { return std::isfinite(value); });
+    const double share = evidence.window.scans == 0
+                             ? 0.0
+                             : static_cast<double>(good) / static_cast<double>(evidence.window.scans);
+    return {"enough_samples", window_min >= options.shortest_window_min && share >= options.good_share,
+            fmt::format("{:.1f} min{}, {:.0f} % of the samples good (needed {:.0f} min, {:.0f} %)", window_min,
+                        evidence.regime.began_with.empty() ? "" : " since " + evidence.regime.began_with, 100.0 * share,
+                        options.shortest_window_min, 100.0 * options.good_share)};
+}
+
+Guard interval_within_tolerance(const ChannelEstimate& now, const FlowOptions& options) {
+    const double half_C = 0.5 * (now.steady_state_high_C - now.steady_state_low_C);
+    return {"interval_within_tolerance", half_C <= options.tolerance_C,
+            fmt::format("settles at {:.2f} C within +-{:.2f} C at 90 % (needed +-{:.2f} C)", now.steady_state_C, half_C,
+                        options.tolerance_C)};
+}
+
+Guard stable_over_windows(const ChannelEstimate& now, const Evidence& evidence, const FlowOptions& options) {
+    double low_C = now.steady_state_C, high_C = now.steady_state_C;
+    std::size_t seen = 0;
+    for (const SpectrumEstimate* shorter : evidence.shorter) {
+        const ChannelEstimate* before = estimate_of(shorter, now.channel);
+        if (before == nullptr) continue;
+        low_C = std::min(low_C, before->steady_state_C);
+        high_C = std::max(high_C, before->steady_state_C);
+        ++seen;
+    }
+    const double allowed_C = options.guards.drift_in_tolerances * options.tolerance_C;
+    return {"stable_over_windows", seen == 2 && high_C - low_C <= allowed_C,
+            seen < 2 ? std::string("no earlier windows to compare with yet")
+                     : fmt::format("the prediction moved by {:.2f} C over the last {:.0f} min (allowed {:.2f} C)",
+                                   high_C - low_C, 2.0 * options.guards.look_back_min, allowed_C)};
+}
+
+Guard slowest_seen_long_enough(const ChannelEstimate& now, const Evidence& evidence, const GuardOptions& options) {
+    const double seen_min = (evidence.window.end_s() - evidence.window.start_s) / 60.0;
+    const double needed_min = options.slow_time_constants * now.slowest_time_constant_min;
+    return {"slowest_seen_long_enough", seen_min >= needed_min,
+            fmt::format("{:.0f} min seen, slowest time constant {:.0f} min (needed {:.0f} min)", seen_min,
+                        now.slowest_time_constant_min, needed_min)};
+}
+
+Guard physical(const ChannelEstimate& now, const GuardOptions& options) {
+    const double direction = now.last_C >= now.start_C ? 1.0 : -1.0;
+    const double ahead_C = direction * (now.steady_state_C - now.last_C);
+    return {"physical", ahead_C >= -options.overshoot_C,
+            fmt::format("from {:.2f} C now to {:.2f} C", now.last_C, now.steady_state_C)};
+}
+
+/// The very same reading while the other channels warm: a sensor or an input that does not measure any more.
+bool is_stuck(const Evidence& evidence, const GuardOptions& options) {
+    const auto scans = static_cast<std::size_t>(options.stuck_min * 60.0 / evidence.window.period_s);
+    if (evidence.window.scans <= scans) return false;
+    const std::size_t first = evidence.window.scans - scans;
+    std::vector<double> moved_C;
+    for (const Column& column : evidence.window.channels) {
+        const double then_C = column.values[first], now_C = last_good(column.values);
+        if (std::isfinite(then_C) && std::isfinite(now_C)) moved_C.push_back(std::abs(now_C - then_C));
+    }
+    if (moved_C.empty()) return false;
+    std::ranges::nth_element(moved_C, moved_C.begin() + static_cast<std::ptrdiff_t>(moved_C.size() / 2));
+    if (moved_C[moved_C.size() / 2] < options.stuck_rise_C) return false;
+    double low = no_value, high = no_value;
+    for (std::size_t i = first; i < evidence.samples.values.size(); ++i) {
+        const double value = evidence.samples.values[i];
+        if (!std::isfinite(value)) continue;
+        low = std::isfinite(low) ? std::min(low, value) : value;
+        high = std::isfinite(high) ? std::max(high, value) : value;
+    }
+    return std::isfinite(low) && high - low <= 0.0;
+}
+
+}  // namespace
+
+Regime current_regime(const TestWindow& window, const FlowOptions& /*options*/) {
+    return {window.start_s, "", window};
+}
+
+ChannelVerdict begin_verdict(const Column& column, double window_end_min) {
+    ChannelVerdict verdict;
+    verdict.channel = column.name;
+    verdict.window_end_min = window_end_min;
+    verdict.value_C = last_good(column.values);
+    return verdict;
+}
+
+void ask_samples(ChannelVerdict& verdict, const Evidence& evidence, const FlowOptions& options) {
+    const bool any_good = std::ranges::any_of(evidence.samples.values, [](double value) { return std::isfinite(value); });
+    const auto scans = static_cast<std::size_t>(options.guards.stuck_min * 60.0 / evidence.window.period_s);
+    const std::size_t first = evidence.samples.values.size() > scans ? evidence.samples.values.size() - scans : 0;
+    const bool recent_good = std::ranges::any_of(std::span(evidence.samples.values).subspan(first),
+                                                 [](double value) { return std::isfinite(value); });
+    verdict.guards.push_back({"alive", any_good && recent_good,
+                              any_good && recent_good ? std::string("good readings")
+                                                      : fmt::format("no good reading in the last {:.0f} min",
+                                                                    options.guards.stuck_min)});
+    if (!verdict.guards.back().passed) verdict.state = ChannelState::dead;
+    const bool stuck = is_stuck(evidence, options.guards);
+    verdict.guards.push_back({"follows_the_machine", !stuck,
+                              stuck ? fmt::format("the very same reading for {:.0f} min while the machine warms",
+                                                  options.guards.stuck_min)
+                                    : std::string("its readings change")});
+    if (stuck) verdict.state = ChannelState::stuck;
+    verdict.guards.push_back(enough_samples(evidence, options.guards));
+}
+
+void take_estimate(ChannelVerdict& verdict, const Evidence& evidence) {
+    const ChannelEstimate* now = estimate_of(evidence.now, verdict.channel);
+    if (now == nullptr) return;
+    verdict.steady_state_C = now->steady_state_C;
+    verdict.steady_state_low_C = now->steady_state_low_C;
+    verdict.steady_state_high_C = now->steady_state_high_C;
+    verdict.equilibrium_time_min = now->equilibrium_time_min;
+    verdict.equilibrium_time_low_min = now->equilibrium_low_min;
+    verdict.equilibrium_time_high_min = now->equilibrium_high_min;
+}
+
+void ask_shared_modes(ChannelVerdict& verdict, const Evidence& evidence, const FlowOptions& options) {
+    const ChannelEstimate* now = estimate_of(evidence.now, verdict.channel);
+    if (now == nullptr) {
+        verdict.guards.push_back({"interval_within_tolerance", false, "the shared time constants are not known yet"});
+        return;
+    }
+    verdict.guards.push_back(interval_within_tolerance(*now, options));
+    verdict.guards.push_back(stable_over_windows(*now, evidence, options));
+    verdict.guards.push_back(slowest_seen_long_enough(*now, evidence, options.guards));
+    verdict.guards.push_back(physical(*now, options.guards));
+    const bool known = first_failed(verdict.guards) == nullptr;
+    if (known && std::abs(now->rise_C) <= options.guards.barely_rise_in_tolerances * options.tolerance_C) {
+        verdict.state = ChannelState::barely_warming;
+    }
+}
+
+void ask_sweep(ChannelVerdict& verdict, const Result<ChannelSweep>& swept, const FlowOptions& options) {
+    if (!swept) {
+        verdict.guards.push_back({"clear_minimum", false, swept.error().message});
+        return;
+    }
+    verdict.rmse_by_n_C = swept->rmse_by_n_C;
+    verdict.n = swept->minimum.n;
+    verdict.window_rmse_C = swept->minimum.n > 0 ? swept->minimum.rmse_C : no_value;
+    verdict.svr = swept->svr;
+    verdict.guards.push_back(swept->minimum.guard);
+    if (options.guards.svr_agreement_C > 0.0) {
+        const double apart_C = std::abs(swept->svr.steady_state_C - verdict.steady_state_C);
+        verdict.guards.push_back({"estimators_agree", apart_C <= options.guards.svr_agreement_C,
+                                  fmt::format("SVR {:.2f} C, shared modes {:.2f} C", swept->svr.steady_state_C,
+                                              verdict.steady_state_C)});
+    }
+}
+
+void conclude(ChannelVerdict& verdict, double window_end_min, const FlowOptions& /*options*/) {
+    const Guard* failed = first_failed(verdict.guards);
+    if (verdict.state != ChannelState::measuring) {
+        verdict.reason = fmt::format("{}: {}", to_string(verdict.state),
+                                     failed != nullptr ? failed->figures : "its whole rise is within the tolerance");
+        return;
+    }
+    if (failed != nullptr) {
+        verdict.reason = fmt::format("{}: {}", failed->name, failed->figures);
+        return;
+    }
+    verdict.state = ChannelState::declared;
+    verdict.declared_at_min = window_end_min;
+    verdict.reason = "declared";
+}
+
+}  // namespace thermbal

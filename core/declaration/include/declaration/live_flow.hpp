@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/error.hpp"
+#include "base/parallel.hpp"
+#include "declaration/criterion.hpp"
+#include "declaration/verdict.hpp"
+#include "filter/denoise.hpp"
+#include "filter/gaps.hpp"
+#include "filter/outliers.hpp"
+#include "modes/spectrum.hpp"
+#include "regression/sweep.hpp"
+#include "series/recorded_test.hpp"
+
+namespace thermbal {
+
+struct GuardOptions {
+    double shortest_window_min = 20.0;    ///< of one regime
+    double good_share = 0.8;              ///< of a channel's samples in the window
+    double look_back_min = 4.0;           ///< "stable": the window, one this much shorter, and one twice as much
+    double drift_in_tolerances = 0.75;    ///< how far the prediction may move over both
+    double slow_time_constants = 1.0;     ///< of the slowest supported time constant that must have been seen
+    double svr_agreement_C = 0.0;         ///< 0: the SVR's steady state is reported, it has no veto
+    double overshoot_C = 0.5;             ///< how far a settling channel may be predicted back below where it is
+    double barely_rise_in_tolerances = 1.0;
+    double stuck_min = 20.0;              ///< the very same reading for so long while the machine warms
+    double stuck_rise_C = 1.0;            ///< "warms": the median channel has risen this much in that time
+};
+
+/// On which channels the SVR sweep, the costly step, is run.
+enum class SweepWhen {
+    always,
+    needed,  ///< only where every guard before it has passed
+    never,   ///< a study of the shared modes alone: the criterion is not asked
+};
+
+struct FlowOptions {
+    std::string ambient = "T1";  ///< the channel that measures the room; empty: none
+    double tolerance_C = 0.2;    ///< half width that the 90 % interval of a declaration may have
+    OutlierOptions outliers;
+    GapOptions gaps;
+    DenoiseOptions filter;
+    SweepOptions sweep;
+    CriterionOptions criterion;
+    SpectrumOptions spectrum;
+    std::optional<SpectrumPrior> prior;  ///< what earlier tests of the machine say
+    GuardOptions guards;
+    std::uint64_t seed = 1;     ///< of everything that is sampled; the same seed gives the same bits
+    SweepWhen sweep_when = SweepWhen::needed;
+};
+
+/// All structural channels at the end of one window, in the window's order.
+struct WindowVerdict {
+    double window_end_min = 0.0;
+    double regime_since_min = 0.0;  ///< when the regime began that the window ends in
+    std::vector<ChannelVerdict> channels;
+};
+
+/// The live flow from the window to the verdict on each channel: what the daemon, `thermbalctl replay` and `identify`
+/// all run. A verdict depends on the window and the options and on nothing else; a LiveFlow only remembers what it has
+/// computed of shorter windows, so that a growing window costs less. One thread at a time.
+class LiveFlow {
+  public:
+    explicit LiveFlow(FlowOptions options) : options_(std::move(options)) {}
+
+    /// Errors: refuse_input when the window cannot be identified at all (no structural channel, unknown ambient),
+    /// retry when it is still too short for anything, stop when `cancelled` said so.
+    Result<WindowVerdict> identify(const TestWindow& window, const ParallelFor& parallel_for,
+                                   const std::function<bool()>& cancelled);
+
+    const FlowOptions& options() const { return options_; }
+
+  private:
+    bool sweep_is_wanted(const ChannelVerdict& channel) const;
+    const Result<SpectrumEstimate>& estimate(const TestWindow& regime);
+
+    FlowOptions options_;
+    std::map<std::pair<std::int64_t, std::size_t>, Result<SpectrumEstimate>> estimates_;  // by start and scans
+};
+
+}  // namespace thermbal

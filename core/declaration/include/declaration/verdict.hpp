@@ -1,0 +1,54 @@
+#pragma once
+
+#include <limits>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "declaration/guard.hpp"
+
+namespace thermbal {
+
+/// What a channel is, at the end of a window.
+enum class ChannelState {
+    measuring,       ///< not known yet: measure on
+    declared,        ///< its steady state is known, and proved
+    barely_warming,  ///< its whole rise is within the tolerance: nothing to declare, nothing to wait for
+    stuck,           ///< its readings do not follow the machine any more
+    dead,            ///< it has no good readings
+};
+std::string_view to_string(ChannelState state);
+
+/// What the support-vector regression of the paper says by itself. NaN where it has no answer.
+struct SvrPrediction {
+    int n = 0;
+    double steady_state_C = std::numeric_limits<double>::quiet_NaN();
+    double equilibrium_time_min = std::numeric_limits<double>::quiet_NaN();
+    double C = std::numeric_limits<double>::quiet_NaN();
+    double sigma = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// One channel at the end of one window. NaN where a figure is not known.
+struct ChannelVerdict {
+    std::string channel;
+    ChannelState state = ChannelState::measuring;
+    double window_end_min = std::numeric_limits<double>::quiet_NaN();
+    double declared_at_min = std::numeric_limits<double>::quiet_NaN();
+    int n = 0;
+    double window_rmse_C = std::numeric_limits<double>::quiet_NaN();
+    std::vector<double> rmse_by_n_C;  ///< [i] belongs to n = i + 1
+    double value_C = std::numeric_limits<double>::quiet_NaN();  ///< the filtered temperature at the window's end
+    double steady_state_C = std::numeric_limits<double>::quiet_NaN();
+    double steady_state_low_C = std::numeric_limits<double>::quiet_NaN();  ///< central 90 % interval
+    double steady_state_high_C = std::numeric_limits<double>::quiet_NaN();
+    double equilibrium_time_min = std::numeric_limits<double>::quiet_NaN();  ///< since the start, 95 % of the rise
+    double equilibrium_time_low_min = std::numeric_limits<double>::quiet_NaN();
+    double equilibrium_time_high_min = std::numeric_limits<double>::quiet_NaN();
+    SvrPrediction svr;
+    std::vector<Guard> guards;  ///< in the order in which they were asked; the first that failed is the reason
+    std::string reason;
+
+    bool declared() const { return state == ChannelState::declared; }
+};
+
+}  // namespace thermbal

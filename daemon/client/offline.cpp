@@ -1,0 +1,174 @@
+#include "offline.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "compute/threads.hpp"
+#include "declaration/declarations.hpp"
+#include "declaration/stop_rule.hpp"
+#include "files.hpp"
+#include "report/verdict_json.hpp"
+#include "series/sample.hpp"
+
+namespace thermbal {
+namespace {
+
+using nlohmann::json;
+
+int refused(const Error& error) {
+    fmt::print(stderr, "thermbalctl: {}\n", error.message);
+    return error.next == NextStep::refuse_input ? 2 : 1;
+}
+
+bool not_cancelled() { return false; }
+
+struct Input {
+    TestWindow window;
+    FlowOptions flow;
+};
+
+/// The recording on its own grid, and the live flow's options; everything that a person can have got wrong is said.
+Result<Input> read_input(const OfflineOptions& options) {
+    const auto text = read_file(options.file);
+    if (!text) return std::unexpected(text.error());
+    const auto test = parse_recorded_test(*text, options.file);
+    if (!test) return std::unexpected(test.error());
+    const double period_s = median_step_s(*test);
+    if (period_s <= 0.0) {
+        return fail(NextStep::refuse_input, fmt::format("{}: one row only; expected a recorded test", options.file));
+    }
+    Input input{to_window(*test, period_s), {}};
+    input.flow.ambient = options.ambient == "none" ? "" : options.ambient;
+    input.flow.tolerance_C = options.tolerance_C;
+    if (options.modes_only) input.flow.sweep_when = SweepWhen::never;
+    if (!input.flow.ambient.empty() && input.window.channel(input.flow.ambient) == nullptr) {
+        return fail(NextStep::refuse_input,
+                    fmt::format("{}: no column {}; name the ambient with --ambient, or --ambient none", options.file,
+                                input.flow.ambient));
+    }
+    for (const std::string& channel : options.channels) {
+        if (input.window.channel(channel) == nullptr) {
+            return fail(NextStep::refuse_input, fmt::format("{}: no column {}", options.file, channel));
+        }
+    }
+    return input;
+}
+
+bool is_wanted(const OfflineOptions& options, const std::string& channel) {
+    return options.channels.empty() || std::ranges::find(options.channels, channel) != options.channels.end();
+}
+
+json channels_json(const OfflineOptions& options, const std::vector<ChannelVerdict>& verdicts) {
+    json list = json::array();
+    for (const ChannelVerdict& verdict : verdicts) {
+        if (is_wanted(options, verdict.channel)) list.push_back(verdict_to_json(verdict));
+    }
+    return list;
+}
+
+void print_table(const OfflineOptions& options, const std::vector<ChannelVerdict>& verdicts) {
+    fmt::print("{:<6} {:<14} {:>9} {:>4} {:>8} {:>9} {:>17} {:>9}  {}\n", "", "state", "declared", "n", "RMSE", "settles",
+               "90 % interval", "95 % at", "reason");
+    const auto number = [](double value, const char* unit, int digits) {
+        return std::isfinite(value) ? fmt::format("{:.{}f} {}", value, digits, unit) : std::string("-");
+    };
+    for (const ChannelVerdict& v : verdicts) {
+        if (!is_wanted(options, v.channel)) continue;
+        const std::string interval = std::isfinite(v.steady_state_low_C)
+                                         ? fmt::format("{:.2f} .. {:.2f} C", v.steady_state_low_C, v.steady_state_high_C)
+                                         : "-";
+        fmt::print("{:<6} {:<14} {:>9} {:>4} {:>8} {:>9} {:>17} {:>9}  {}\n", v.channel, to_string(v.state),
+                   number(v.declared_at_min, "min", 1), v.n > 0 ? std::to_string(v.n) : "-",
+                   number(v.window_rmse_C, "C", 3), number(v.steady_state_C, "C", 2), interval,
+                   number(v.equilibrium_time_min, "min", 0), v.reason);
+    }
+}
+
+}  // namespace
+
+int run_identify(const OfflineOptions& options) {
+    auto input = read_input(options);
+    if (!input) return refused(input.error());
+    if (options.until_min) input->window = window_until(input->window, *options.until_min * 60.0);
+    if (!options.modes_only) input->flow.sweep_when = SweepWhen::always;
+    LiveFlow flow(input->flow);
+    const auto verdict = flow.identify(input->window, parallel_on_threads(options.threads, false), not_cancelled);
+    if (!verdict) return refused(verdict.error());
+    if (options.json) {
+        fmt::print("{}\n", json{{"window_end_min", verdict->window_end_min},
+                                {"regime_since_min", verdict->regime_since_min},
+                                {"channels", channels_json(options, verdict->channels)}}
+                               .dump(2));
+    } else {
+        fmt::print("window: {:.2f} to {:.2f} min\n", verdict->regime_since_min, verdict->window_end_min);
+        print_table(options, verdict->channels);
+    }
+    return 0;
+}
+
+int run_replay(const OfflineOptions& options) {
+    const auto input = read_input(options);
+    if (!input) return refused(input.error());
+    const ParallelFor parallel_for = parallel_on_threads(options.threads, false);
+    LiveFlow flow(input->flow);
+    Declarations declarations;
+    json changes = json::array();
+    double stopped_at_min = no_value;
+    StopDecision decision;
+    const double end_min = input->window.end_s() / 60.0;
+    const double first_min = input->window.start_s / 60.0;
+    for (double until_min = first_min + options.every_min; until_min <= end_min + 1e-9; until_min += options.every_min) {
+        const TestWindow window = window_until(input->window, until_min * 60.0);
+        const auto verdict = flow.identify(window, parallel_for, not_cancelled);
+        if (!verdict && verdict.error().next == NextStep::refuse_input) return refused(verdict.error());
+        if (!verdict) continue;
+        for (const DeclarationChange& change : declarations.update(verdict->channels, verdict->regime_since_min)) {
+            const bool declared = change.kind == DeclarationChange::Kind::declared;
+            changes.push_back({{"at_min", verdict->window_end_min},
+                               {"channel", change.channel},
+                               {"change", declared ? "declared" : "withdrawn"},
+                               {"reason", change.reason}});
+            if (!options.json) {
+                fmt::print("{:7.2f} min  {} {}: {}\n", verdict->window_end_min, change.channel,
+                           declared ? "declared" : "withdrawn", change.reason);
+            }
+        }
+        decision = decide_stop(declarations.standing(), std::vector<bool>(declarations.standing().size(), true));
+        if (decision.stop) {
+            stopped_at_min = verdict->window_end_min;
+            break;
+        }
+    }
+    // Of the channels that were not declared a person wants to see the curve too.
+    std::vector<ChannelVerdict> last = declarations.standing();
+    if (!decision.stop && !options.modes_only) {
+        FlowOptions everything = input->flow;
+        everything.sweep_when = SweepWhen::always;
+        const auto verdict = LiveFlow(everything).identify(input->window, parallel_for, not_cancelled);
+        for (ChannelVerdict& channel : last) {
+            if (channel.declared() || !verdict) continue;
+            const auto whole = std::ranges::find(verdict->channels, channel.channel, &ChannelVerdict::channel);
+            if (whole != verdict->channels.end() && !whole->declared()) channel = *whole;
+        }
+    }
+    if (options.json) {
+        fmt::print("{}\n", json{{"test_stopped_at_min", number_or_null(stopped_at_min)},
+                                {"reason", decision.reason},
+                                {"changes", std::move(changes)},
+                                {"channels", channels_json(options, last)}}
+                               .dump(2));
+    } else {
+        print_table(options, last);
+        fmt::print("{}\n", std::isfinite(stopped_at_min)
+                               ? fmt::format("test stopped at {:.2f} of {:.2f} min: {}", stopped_at_min, end_min,
+                                             decision.reason)
+                               : fmt::format("test not stopped in {:.2f} min: {}", end_min, decision.reason));
+    }
+    return 0;
+}
+
+}  // namespace thermbal

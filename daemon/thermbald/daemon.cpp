@@ -1,0 +1,156 @@
+#include "daemon.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "report/verdict_json.hpp"
+
+namespace thermbal {
+
+// The live flow:
+//   module -> scan -> store -> window -> (filter -> SVR sweep -> criterion, shared time constants -> interval:
+//   core's LiveFlow, on the identifier's thread) -> declaration -> stop rule -> stop
+
+void Daemon::take_scan(const Scan& scan) {
+    latest_ = scan;
+    if (is_measuring(test_.state)) {
+        store_scan(scan);
+        grow_window(scan);
+        if (identification_is_due(scan.scan)) {
+            test_.submitted_scan = scan.scan;
+            identifier_->submit({generation_, scan.scan, test_.window});
+        }
+        if (over_time(scan)) {
+            end_test(TestEvent::abort, fmt::format("longer than test.max_duration_min = {}",
+                                                   *options_.config.test.max_duration_min));
+        }
+    }
+    server_.publish("scan", channels_json().value_or(nullptr));
+    if (!is_measuring(test_.state) || test_.submitted_scan != scan.scan) settle(scan.scan);
+}
+
+void Daemon::take_identification(IdentificationResult result) {
+    if (result.generation != generation_ || !is_measuring(test_.state)) return;
+    identification_s_.add(result.seconds);
+    test_.identification_s = result.seconds;
+    if (!result.verdict) {
+        spdlog::debug("identification at scan {}: {}", result.window_end_scan, result.verdict.error().message);
+    } else {
+        test_.identified_scan = result.window_end_scan;
+        const auto changes =
+            test_.declarations.update(result.verdict->channels, result.verdict->regime_since_min);
+        record_changes(changes, result.window_end_scan);
+        server_.publish("predictions", predictions_json().value_or(nullptr));
+        decide();
+    }
+    settle(result.window_end_scan);
+}
+
+void Daemon::decide() {
+    std::vector<bool> required;
+    for (const ChannelVerdict& verdict : test_.declarations.standing()) {
+        const auto channel = std::ranges::find(options_.config.channels, verdict.channel, &ChannelConfig::name);
+        required.push_back(channel != options_.config.channels.end() && channel->required);
+    }
+    test_.decision = decide_stop(test_.declarations.standing(), required);
+    if (!test_.decision.stop || test_.state != TestState::running) return;
+
+    test_.state = TestState::declared;
+    if (const auto stored = store_.set_state(test_.id, TestState::declared, now(), test_.decision.reason); !stored) {
+        spdlog::error("{}", stored.error().message);
+    }
+    event("all_declared", test_.decision.reason);
+    if (options_.config.test.keep_measuring) {
+        event("keep_measuring", "the test goes on as configured, so that the prediction can be checked");
+    } else {
+        end_test(TestEvent::stop, test_.decision.reason);
+        carry_out_stop();
+    }
+}
+
+void Daemon::end_test(TestEvent how, const std::string& reason) {
+    const auto state = next_state(test_.state, how);
+    if (!state) return;
+    identifier_->cancel();
+    test_.state = *state;
+    test_.end_reason = reason;
+    if (const auto stored = store_.set_state(test_.id, *state, now(), reason); !stored) {
+        spdlog::error("the end of test {} is not stored yet: {}", test_.id, stored.error().message);
+    }
+    event(to_string(*state), reason);
+    server_.publish("status", status_json().value_or(nullptr));
+    notify_status(fmt::format("test {}: {}", to_string(*state), reason));
+}
+
+void Daemon::grow_window(const Scan& scan) {
+    TestWindow& window = test_.window;
+    const auto rows = static_cast<std::size_t>(scan.scan + 1);
+    for (std::size_t channel = 0; channel < window.channels.size(); ++channel) {
+        window.channels[channel].values.resize(rows, no_value);
+        const Sample& sample = scan.samples[channel];
+        if (!sample.good()) continue;
+        window.channels[channel].values.back() = sample.value_C;
+        newest_good_C_[channel] = sample.value_C;
+    }
+    window.scans = rows;
+    test_.last_scan = scan.scan;
+}
+
+bool Daemon::identification_is_due(std::int64_t scan) const {
+    const double every = options_.config.identification.every_s / options_.config.test.period_s;
+    return static_cast<double>(scan - test_.submitted_scan) >= std::max(1.0, every) - 1e-9 && !identifier_->busy();
+}
+
+void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::int64_t window_end_scan) {
+    std::vector<IdentificationRecord> records;
+    for (const ChannelVerdict& verdict : test_.declarations.standing()) {
+        records.push_back({verdict.channel, window_end_scan, clock_.wall_ns(), verdict_to_json(verdict).dump()});
+    }
+    if (const auto stored = store_.record_identifications(test_.id, records); !stored) {
+        spdlog::warn("an identification is not stored: {}", stored.error().message);
+    }
+    for (const DeclarationChange& change : changes) {
+        if (change.kind == DeclarationChange::Kind::withdrawn) {
+            if (const auto stored = store_.withdraw_declaration(test_.id, change.channel, change.reason); !stored) {
+                spdlog::error("{}", stored.error().message);
+            }
+            event("withdrawn", fmt::format("{}: the declaration is withdrawn: {}", change.channel, change.reason),
+                  change.channel);
+            continue;
+        }
+        const ChannelVerdict& verdict = *verdict_of(change.channel);
+        DeclarationRecord record{.channel = verdict.channel,
+                                 .window_end_scan = window_end_scan,
+                                 .declared_at_min = verdict.declared_at_min,
+                                 .n = verdict.n,
+                                 .C = verdict.svr.C,
+                                 .sigma = verdict.svr.sigma,
+                                 .steady_state_C = verdict.steady_state_C,
+                                 .steady_state_low_C = verdict.steady_state_low_C,
+                                 .steady_state_high_C = verdict.steady_state_high_C,
+                                 .equilibrium_time_min = verdict.equilibrium_time_min,
+                                 .rmse_by_n_C = verdict.rmse_by_n_C,
+                                 .basis_json = verdict_to_json(verdict).dump(),
+                                 .version = options_.version};
+        if (const auto stored = store_.record_declaration(test_.id, record); !stored) {
+            spdlog::error("the declaration of {} is not stored: {}", verdict.channel, stored.error().message);
+        }
+        event("declared",
+              fmt::format("{} settles at {:.2f} C ({:.2f} to {:.2f} C), 95 % of the rise at {:.0f} min", verdict.channel,
+                          verdict.steady_state_C, verdict.steady_state_low_C, verdict.steady_state_high_C,
+                          verdict.equilibrium_time_min),
+              verdict.channel);
+        server_.publish("declaration", verdict_to_json(verdict));
+    }
+}
+
+bool Daemon::over_time(const Scan& scan) const {
+    const auto& limit_min = options_.config.test.max_duration_min;
+    return limit_min && test_.grid.time_s(scan.scan) > *limit_min * 60.0;
+}
+
+}  // namespace thermbal

@@ -1,0 +1,157 @@
+#pragma once
+
+#include <systemd/sd-event.h>
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "acquisition/clock.hpp"
+#include "acquisition/line_reader.hpp"
+#include "acquisition/mailbox.hpp"
+#include "acquisition/scan.hpp"
+#include "compute/identifier.hpp"
+#include "config/config.hpp"
+#include "declaration/declarations.hpp"
+#include "declaration/stop_rule.hpp"
+#include "modbus_line.hpp"
+#include "series/test_state.hpp"
+#include "service/hooks.hpp"
+#include "service/server.hpp"
+#include "statistics.hpp"
+#include "store/store.hpp"
+
+namespace thermbal {
+
+struct DaemonOptions {
+    Config config;
+    std::string version;
+    /// Says which monotonic clock the stored times belong to: another boot is another clock.
+    std::string boot_id;
+    bool exit_when_ended = false;  ///< leave the event loop when a test has ended
+};
+
+/// The daemon: one event loop that owns the store, the socket and the test; a thread a line; a thread that identifies.
+/// The live flow stands in take_scan and take_identification; everything else serves them.
+class Daemon {
+  public:
+    /// Opens the database and the socket, takes up the test that was open when an earlier daemon ended, starts the
+    /// lines. `clock` outlives the daemon.
+    static Result<std::unique_ptr<Daemon>> create(DaemonOptions options, Clock& clock);
+    ~Daemon();
+    Daemon(const Daemon&) = delete;
+    Daemon& operator=(const Daemon&) = delete;
+
+    /// Until SIGTERM or SIGINT (a running test stays open and is taken up at the next start), or with exit_when_ended
+    /// until the test has ended.
+    Result<void> run();
+
+  private:
+    /// The test under way, or the latest one.
+    struct LiveTest {
+        TestId id = 0;
+        TestState state = TestState::idle;
+        Grid grid;
+        std::int64_t started_wall_ns = 0;
+        std::string name;
+        TestWindow window;
+        Declarations declarations;
+        StopDecision decision;
+        std::int64_t last_scan = -1;
+        std::optional<std::int64_t> identified_scan;  ///< newest window that was identified
+        std::int64_t submitted_scan = -1;             ///< newest window given to the identifier
+        double identification_s = 0.0;
+        std::string end_reason;
+        int stop_attempts = 0;
+    };
+
+    Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer server, HookRunner hooks);
+
+    // The live flow (daemon.cpp).
+    void take_scan(const Scan& scan);
+    void take_identification(IdentificationResult result);
+    void grow_window(const Scan& scan);
+    bool identification_is_due(std::int64_t scan) const;
+    void record_changes(const std::vector<DeclarationChange>& changes, std::int64_t window_end_scan);
+    void decide();
+    void end_test(TestEvent how, const std::string& reason);
+    bool over_time(const Scan& scan) const;
+
+    // Starting and resuming (tests.cpp).
+    Result<TestId> start_test(const std::string& name, const std::string& machine);
+    void resume(ResumedTest resumed);
+    void follow_grid(Grid grid, std::int64_t first_scan);
+    void begin_window(double period_s);
+
+    // The stop action (stop_action.cpp).
+    void carry_out_stop();
+    void write_stop_register();
+    void take_stop_outcome(const Result<void>& outcome);
+
+    // Storing, events (recording.cpp).
+    void store_scan(const Scan& scan);
+    void event(std::string_view kind, const std::string& message, const std::optional<std::string>& channel = {});
+    ScanRecord record_of(const Scan& scan) const;
+    Moment now() const;
+
+    // The socket's methods (requests.cpp).
+    void add_methods();
+    Result<nlohmann::json> status_json() const;
+    Result<nlohmann::json> channels_json() const;
+    Result<nlohmann::json> samples_json(const nlohmann::json& params) const;
+    Result<nlohmann::json> curve_json(const nlohmann::json& params) const;
+    Result<nlohmann::json> predictions_json() const;
+    Result<nlohmann::json> events_json(const nlohmann::json& params) const;
+    Result<nlohmann::json> health_json() const;
+    Result<nlohmann::json> on_start(const nlohmann::json& params);
+    Result<nlohmann::json> on_stop(const nlohmann::json& params);
+    Result<nlohmann::json> on_annotate(const nlohmann::json& params);
+    const ChannelVerdict* verdict_of(const std::string& channel) const;
+
+    // The event loop (loop.cpp).
+    Result<void> attach();
+    void on_line_readings();
+    void on_identifications();
+    void close_overdue_scans();
+    void arm_close_timer();
+    void feed_watchdog();
+    void settle(std::int64_t scan);
+
+    DaemonOptions options_;
+    Clock& clock_;
+    Store store_;
+    SocketServer server_;
+    HookRunner hooks_;
+    LiveTest test_;
+    std::optional<Scan> latest_;  ///< newest scan, in a test or not
+    std::vector<double> newest_good_C_;
+    std::deque<ScanRecord> unstored_;  ///< acknowledged by nobody yet: the disk does not take them
+    std::uint64_t lost_scans_ = 0;     ///< dropped from unstored_ because it was full
+    std::uint64_t generation_ = 0;
+    std::optional<ScanAssembler> assembler_;
+    RecentFigures lateness_ms_, commit_ms_, identification_s_;
+    std::uint64_t scans_ok_ = 0, scans_late_ = 0, scans_missed_ = 0;
+    std::int64_t started_ns_ = 0;
+    std::int64_t last_progress_ns_ = 0;
+
+    sd_event* loop_ = nullptr;
+    sd_event_source* close_timer_ = nullptr;
+    sd_event_source* watchdog_timer_ = nullptr;
+
+    Mailbox<LineScan> line_readings_;
+    Mailbox<IdentificationResult> identifications_;
+    Mailbox<Result<void>> stop_outcomes_;
+    struct LogLine {
+        std::string message;
+        bool is_trouble;
+    };
+    Mailbox<LogLine> line_log_;
+    std::vector<std::unique_ptr<ModbusLine>> lines_;
+    std::unique_ptr<Identifier> identifier_;           // its thread uses the mailboxes above
+    std::vector<std::unique_ptr<LineReader>> readers_;  // last: their threads use lines and mailboxes
+};
+
+}  // namespace thermbal

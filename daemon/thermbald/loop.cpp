@@ -1,0 +1,231 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <sys/signalfd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstring>
+#include <utility>
+
+#include "compute/threads.hpp"
+#include "config/load.hpp"
+#include "daemon.hpp"
+#include "flow_options.hpp"
+#include "service/notify.hpp"
+
+namespace thermbal {
+namespace {
+
+/// A scan whose line says nothing is closed this long after its period: the line's own bound ends before that.
+constexpr std::int64_t close_grace_ns = 20'000'000;
+
+Result<void> check(int code, std::string_view what) {
+    if (code >= 0) return {};
+    return fail(NextStep::stop, fmt::format("{}: {}", what, strerrordesc_np(-code)));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Daemon>> Daemon::create(DaemonOptions options, Clock& clock) {
+    const Config& config = options.config;
+    auto store = Store::open(config.store.path, {clock.wall_ns(), clock.monotonic_ns()});
+    if (!store) return std::unexpected(store.error());
+    auto server = SocketServer::open({.path = config.service.socket, .operators_group = config.service.operators_group});
+    if (!server) return std::unexpected(server.error());
+    auto hooks = HookRunner::create();
+    if (!hooks) return std::unexpected(hooks.error());
+    std::unique_ptr<Daemon> daemon(
+        new Daemon(std::move(options), clock, std::move(*store), std::move(*server), std::move(*hooks)));
+    if (auto attached = daemon->attach(); !attached) return std::unexpected(attached.error());
+    return daemon;
+}
+
+Daemon::Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer server, HookRunner hooks)
+    : options_(std::move(options)),
+      clock_(clock),
+      store_(std::move(store)),
+      server_(std::move(server)),
+      hooks_(std::move(hooks)),
+      started_ns_(clock.monotonic_ns()),
+      last_progress_ns_(real_monotonic_ns()) {
+    newest_good_C_.assign(options_.config.channels.size(), no_value);
+    for (std::size_t i = 0; i < options_.config.lines.size(); ++i) {
+        lines_.push_back(std::make_unique<ModbusLine>(
+            options_.config, i, real_monotonic_ns,
+            [this](const std::string& message, bool trouble) { line_log_.push({message, trouble}); }));
+    }
+    const Config& config = options_.config;
+    identifier_ = std::make_unique<Identifier>(
+        [flow = LiveFlow(flow_options(config)), parallel = parallel_on_threads(config.identification.workers, true)](
+            const TestWindow& window, const std::function<bool()>& cancelled) mutable {
+            return flow.identify(window, parallel, cancelled);
+        },
+        [this](IdentificationResult result) { identifications_.push(std::move(result)); });
+    for (std::size_t i = 0; i < lines_.size(); ++i) {
+        readers_.push_back(std::make_unique<LineReader>(i, *lines_[i], clock_, line_readings_));
+    }
+}
+
+Daemon::~Daemon() {
+    readers_.clear();
+    identifier_.reset();
+    sd_event_source_unref(close_timer_);
+    sd_event_source_unref(watchdog_timer_);
+    sd_event_unref(loop_);
+}
+
+Result<void> Daemon::attach() {
+    if (auto made = check(sd_event_new(&loop_), "event loop"); !made) return made;
+    const auto on_readable = [this](int fd, void (*handler)(Daemon&)) {
+        // sd-event hands one pointer on; the handler's own address travels in a small closure that the loop outlives.
+        struct Closure {
+            Daemon* daemon;
+            void (*handler)(Daemon&);
+        };
+        auto* closure = new Closure{this, handler};
+        sd_event_source* source = nullptr;
+        const int added = sd_event_add_io(
+            loop_, &source, fd, EPOLLIN,
+            [](sd_event_source*, int, std::uint32_t, void* data) {
+                const auto* self = static_cast<Closure*>(data);
+                self->handler(*self->daemon);
+                return 0;
+            },
+            closure);
+        if (added < 0) {
+            delete closure;
+            return check(added, "event loop");
+        }
+        sd_event_source_set_destroy_callback(source, [](void* data) { delete static_cast<Closure*>(data); });
+        sd_event_source_set_floating(source, 1);
+        sd_event_source_unref(source);
+        return Result<void>{};
+    };
+    // Scans first: what waits in the line's box is always older than what a client asks for.
+    const std::pair<int, void (*)(Daemon&)> sources[] = {
+        {line_readings_.fd(), [](Daemon& self) { self.on_line_readings(); }},
+        {identifications_.fd(), [](Daemon& self) { self.on_identifications(); }},
+        {stop_outcomes_.fd(),
+         [](Daemon& self) {
+             for (const auto& outcome : self.stop_outcomes_.take()) self.take_stop_outcome(outcome);
+         }},
+        {line_log_.fd(),
+         [](Daemon& self) {
+             for (const LogLine& line : self.line_log_.take()) {
+                 self.event(line.is_trouble ? "line_trouble" : "line_ok", line.message);
+             }
+         }},
+        {server_.fd(), [](Daemon& self) { self.server_.dispatch(); }},
+        {hooks_.fd(), [](Daemon& self) { self.hooks_.dispatch(); }},
+    };
+    for (const auto& [fd, handler] : sources) {
+        if (auto added = on_readable(fd, handler); !added) return added;
+    }
+    for (const int signal : {SIGTERM, SIGINT}) {
+        const auto leave = [](sd_event_source* source, const signalfd_siginfo*, void*) {
+            return sd_event_exit(sd_event_source_get_event(source), 0);
+        };
+        if (auto added = check(sd_event_add_signal(loop_, nullptr, signal, leave, nullptr), "signals"); !added) {
+            return added;
+        }
+    }
+    const auto on_close_time = [](sd_event_source*, std::uint64_t, void* self) {
+        static_cast<Daemon*>(self)->close_overdue_scans();
+        return 0;
+    };
+    if (auto added = check(sd_event_add_time(loop_, &close_timer_, CLOCK_BOOTTIME, UINT64_MAX, 1000, on_close_time, this),
+                           "timer");
+        !added) {
+        return added;
+    }
+    add_methods();
+    return {};
+}
+
+Result<void> Daemon::run() {
+    auto resumed = store_.resume();
+    if (!resumed) return std::unexpected(resumed.error());
+    if (store_.set_aside()) {
+        event("database_set_aside", fmt::format("the database was damaged; it is kept as {} and a new one is begun",
+                                                store_.set_aside()->string()));
+    }
+    if (*resumed) {
+        resume(std::move(**resumed));
+    } else if (options_.config.test.start == TestConfig::Start::automatic) {
+        if (const auto id = start_test(options_.config.test.name, options_.config.test.machine); !id) {
+            return std::unexpected(id.error());
+        }
+    } else {
+        follow_grid({clock_.monotonic_ns(), static_cast<std::int64_t>(options_.config.test.period_s * 1e9)}, 0);
+    }
+    notify_ready(is_measuring(test_.state) ? fmt::format("test {} is running", test_.id) : "no test is running");
+    feed_watchdog();
+    const auto ended = check(sd_event_loop(loop_), "event loop");
+    notify_stopping(is_measuring(test_.state) ? "the running test goes on at the next start" : "");
+    return ended;
+}
+
+void Daemon::on_line_readings() {
+    for (LineScan& reading : line_readings_.take()) {
+        if (reading.generation == generation_) {
+            lateness_ms_.add(static_cast<double>(reading.started_ns - assembler_->grid().due_ns(reading.scan)) * 1e-6);
+        }
+        assembler_->add(std::move(reading));
+    }
+    close_overdue_scans();
+}
+
+void Daemon::close_overdue_scans() {
+    const std::uint64_t generation = generation_;
+    for (const Scan& scan : assembler_->take_closed(clock_.monotonic_ns() - close_grace_ns, clock_.wall_ns() - close_grace_ns)) {
+        (scan.status == ScanStatus::missed ? scans_missed_ : scan.status == ScanStatus::late ? scans_late_ : scans_ok_)++;
+        take_scan(scan);
+        if (generation != generation_) break;  // a test began or ended on this scan: the others belong to the old grid
+    }
+    last_progress_ns_ = real_monotonic_ns();
+    if (options_.exit_when_ended && test_.id > 0 && !is_measuring(test_.state) && hooks_.running() == 0) {
+        sd_event_exit(loop_, 0);
+    }
+    arm_close_timer();
+}
+
+void Daemon::on_identifications() {
+    for (IdentificationResult& result : identifications_.take()) take_identification(std::move(result));
+}
+
+/// A silent line must not hold the others: the oldest open scan is closed when its period is over.
+void Daemon::arm_close_timer() {
+    const std::int64_t wait_ns = std::max<std::int64_t>(clock_.real_ns_until(assembler_->next_close_ns() + close_grace_ns), 0);
+    std::uint64_t now_us = 0;
+    sd_event_now(loop_, CLOCK_BOOTTIME, &now_us);
+    sd_event_source_set_time(close_timer_, now_us + static_cast<std::uint64_t>(wait_ns) / 1000 + 1);
+    sd_event_source_set_enabled(close_timer_, SD_EVENT_ONESHOT);
+}
+
+/// systemd hears from us only while the grid advances: three periods without a closed scan are no progress.
+void Daemon::feed_watchdog() {
+    const auto interval = watchdog_interval();
+    if (!interval) return;
+    const double silent_s = static_cast<double>(real_monotonic_ns() - last_progress_ns_) * 1e-9;
+    if (silent_s < 3.0 * options_.config.test.period_s) notify_watchdog();
+    std::uint64_t now_us = 0;
+    sd_event_now(loop_, CLOCK_MONOTONIC, &now_us);
+    const std::uint64_t due_us = now_us + static_cast<std::uint64_t>(interval->count());
+    if (watchdog_timer_ == nullptr) {
+        const auto again = [](sd_event_source*, std::uint64_t, void* self) {
+            static_cast<Daemon*>(self)->feed_watchdog();
+            return 0;
+        };
+        sd_event_add_time(loop_, &watchdog_timer_, CLOCK_MONOTONIC, due_us, 0, again, this);
+        return;
+    }
+    sd_event_source_set_time(watchdog_timer_, due_us);
+    sd_event_source_set_enabled(watchdog_timer_, SD_EVENT_ONESHOT);
+}
+
+/// Time may go on (for a clock that waits): the scan is stored, and identified where that was due.
+void Daemon::settle(std::int64_t scan) {
+    if (assembler_) clock_.settled(assembler_->grid().due_ns(scan));
+}
+
+}  // namespace thermbal

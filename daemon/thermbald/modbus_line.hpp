@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "acquisition/line_reader.hpp"
+#include "config/config.hpp"
+#include "modbus/link.hpp"
+#include "modbus/unit.hpp"
+
+namespace thermbal {
+
+/// What health tells of a line. A copy, taken at its last scan.
+struct LineHealth {
+    std::string name;
+    LinkCounters counters;
+    struct Unit {
+        std::string name;
+        bool answering = false;
+        std::string last_error;
+        double round_trip_ms = 0.0;  ///< of the last scan
+        std::uint64_t failures = 0;  ///< scans without a trustworthy answer
+    };
+    std::vector<Unit> units;
+};
+
+/// A line of the configuration on a real link: one block read a unit, registers decoded by the unit's profile.
+class ModbusLine final : public Line {
+  public:
+    using Log = std::function<void(const std::string& message, bool is_trouble)>;
+
+    /// `line` is an index into config.lines. `log` is called on the line's thread when a unit falls silent or answers
+    /// again, not for every failure.
+    ModbusLine(const Config& config, std::size_t line, std::function<std::int64_t()> real_ns, Log log);
+
+    std::vector<ChannelSample> read_scan() override;
+    Result<void> write(const RegisterWrite& write) override;
+
+    LineHealth health() const;  ///< any thread
+
+  private:
+    struct ConfiguredChannel {
+        std::size_t channel;
+        std::size_t input;  // 0-based
+        double offset_C;
+    };
+    struct ConfiguredUnit {
+        UnitPlan plan;
+        std::vector<ConfiguredChannel> channels;
+    };
+
+    void note(std::size_t unit, const UnitReading& reading);
+
+    std::unique_ptr<Link> link_;
+    std::vector<ConfiguredUnit> units_;
+    const std::function<std::int64_t()> real_ns_;
+    const Log log_;
+    mutable std::mutex mutex_;
+    LineHealth health_;  // guarded by mutex_
+};
+
+}  // namespace thermbal

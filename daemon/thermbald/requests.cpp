@@ -1,0 +1,338 @@
+#include <fmt/format.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "daemon.hpp"
+#include "report/verdict_json.hpp"
+
+namespace thermbal {
+namespace {
+
+using nlohmann::json;
+
+Result<json> bad_param(std::string_view what) { return fail(NextStep::refuse_input, std::string(what)); }
+
+/// A string parameter; empty when it is not given.
+Result<std::string> text_param(const json& params, const char* key) {
+    const auto found = params.find(key);
+    if (found == params.end() || found->is_null()) return std::string();
+    if (!found->is_string()) return fail(NextStep::refuse_input, fmt::format("{}: expected a string", key));
+    return found->get<std::string>();
+}
+
+Result<std::int64_t> integer_param(const json& params, const char* key, std::int64_t otherwise) {
+    const auto found = params.find(key);
+    if (found == params.end() || found->is_null()) return otherwise;
+    if (!found->is_number_integer()) return fail(NextStep::refuse_input, fmt::format("{}: expected an integer", key));
+    return found->get<std::int64_t>();
+}
+
+json sample_json(const Sample& sample) {
+    return {{"value_C", sample.good() ? json(sample.value_C) : json(nullptr)},
+            {"raw", sample.raw ? json(*sample.raw) : json(nullptr)},
+            {"quality", to_string(sample.quality)}};
+}
+
+json figures_json(const RecentFigures& figures) {
+    return {{"count", figures.count()},
+            {"p50", figures.quantile(0.5)},
+            {"p99", figures.quantile(0.99)},
+            {"p999", figures.quantile(0.999)},
+            {"max", figures.maximum()}};
+}
+
+/// Least-squares slope of the newest good samples, in C per hour; NaN with fewer than two.
+double rate_C_per_h(const std::vector<double>& values_C, double period_s, std::size_t samples) {
+    const std::size_t first = values_C.size() > samples ? values_C.size() - samples : 0;
+    double n = 0, st = 0, sv = 0, stt = 0, stv = 0;
+    for (std::size_t i = first; i < values_C.size(); ++i) {
+        if (!std::isfinite(values_C[i])) continue;
+        const double t_h = static_cast<double>(i - first) * period_s / 3600.0;
+        n += 1;
+        st += t_h;
+        sv += values_C[i];
+        stt += t_h * t_h;
+        stv += t_h * values_C[i];
+    }
+    const double determinant = n * stt - st * st;
+    return determinant > 0 ? (n * stv - st * sv) / determinant : no_value;
+}
+
+double first_good(const std::vector<double>& values) {
+    const auto found = std::ranges::find_if(values, [](double value) { return std::isfinite(value); });
+    return found == values.end() ? no_value : *found;
+}
+
+/// Evenly thinned to at most `count` values, for a sparkline.
+json thinned(const std::vector<double>& values, std::size_t count) {
+    json list = json::array();
+    const std::size_t wanted = std::min(count, values.size());
+    for (std::size_t i = 0; i < wanted; ++i) list.push_back(number_or_null(values[(i + 1) * values.size() / wanted - 1]));
+    return list;
+}
+
+}  // namespace
+
+const ChannelVerdict* Daemon::verdict_of(const std::string& channel) const {
+    const auto& standing = test_.declarations.standing();
+    const auto found = std::ranges::find(standing, channel, &ChannelVerdict::channel);
+    return found == standing.end() ? nullptr : &*found;
+}
+
+void Daemon::add_methods() {
+    const auto reads = [this](const char* name, auto method) {
+        server_.add_method(name, Access::reads, [this, method](const Request& request) -> Result<json> {
+            if constexpr (std::is_invocable_v<decltype(method), Daemon&, const json&>) {
+                return std::invoke(method, *this, request.params);
+            } else {
+                return std::invoke(method, *this);
+            }
+        });
+    };
+    reads("status", &Daemon::status_json);
+    reads("channels", &Daemon::channels_json);
+    reads("samples", &Daemon::samples_json);
+    reads("curve", &Daemon::curve_json);
+    reads("predictions", &Daemon::predictions_json);
+    reads("events", &Daemon::events_json);
+    reads("health", &Daemon::health_json);
+    const auto changes = [this](const char* name, Result<json> (Daemon::*method)(const json&)) {
+        server_.add_method(name, Access::changes, [this, method](const Request& request) {
+            return std::invoke(method, *this, request.params);
+        });
+    };
+    changes("start_test", &Daemon::on_start);
+    changes("stop_test", &Daemon::on_stop);
+    changes("annotate", &Daemon::on_annotate);
+}
+
+Result<json> Daemon::status_json() const {
+    const double now_s = static_cast<double>(clock_.monotonic_ns()) * 1e-9;
+    json status = {{"state", to_string(test_.state)},
+                   {"version", options_.version},
+                   {"machine", options_.config.test.machine},
+                   {"database", options_.config.store.path},
+                   {"period_s", options_.config.test.period_s},
+                   {"tolerance_C", options_.config.identification.tolerance_C},
+                   {"keep_measuring", options_.config.test.keep_measuring},
+                   {"test", nullptr},
+                   {"last_scan_age_s", nullptr}};
+    if (latest_) {
+        const bool asked = latest_->status != ScanStatus::missed;
+        status["last_scan_age_s"] = now_s - static_cast<double>(asked ? latest_->started_ns : latest_->due_ns) * 1e-9;
+        status["good_channels"] = std::ranges::count_if(latest_->samples, &Sample::good);
+    }
+    if (test_.id > 0) {
+        std::size_t declared = 0;
+        for (const ChannelVerdict& verdict : test_.declarations.standing()) declared += verdict.declared() ? 1U : 0U;
+        status["test"] = {{"id", test_.id},
+                          {"name", test_.name},
+                          {"time_min", test_.grid.time_s(std::max<std::int64_t>(test_.last_scan, 0)) / 60.0},
+                          {"scans", test_.last_scan + 1},
+                          {"declared_channels", declared},
+                          {"waiting", test_.decision.waiting},
+                          {"reason", is_measuring(test_.state) ? test_.decision.reason : test_.end_reason},
+                          {"identified_at_min", test_.identified_scan
+                                                    ? json(test_.grid.time_s(*test_.identified_scan) / 60.0)
+                                                    : json(nullptr)},
+                          {"identification_s", test_.identification_s}};
+    }
+    return status;
+}
+
+Result<json> Daemon::channels_json() const {
+    constexpr std::size_t sparkline_points = 24;
+    constexpr double rate_over_s = 600.0;
+    json list = json::array();
+    for (std::size_t i = 0; i < options_.config.channels.size(); ++i) {
+        const ChannelConfig& channel = options_.config.channels[i];
+        json entry = latest_ ? sample_json(latest_->samples[i]) : sample_json(Sample{});
+        entry["channel"] = channel.name;
+        entry["place"] = channel.place;
+        entry["role"] = channel.role == ChannelConfig::Role::ambient ? "ambient" : "structure";
+        entry["required"] = channel.required;
+        if (test_.id > 0) {
+            const std::vector<double>& values_C = test_.window.channels[i].values;
+            const auto samples = static_cast<std::size_t>(rate_over_s / test_.window.period_s);
+            entry["rise_C"] = number_or_null(newest_good_C_[i] - first_good(values_C));
+            entry["rate_C_per_h"] = number_or_null(rate_C_per_h(values_C, test_.window.period_s, samples));
+            entry["recent_C"] = thinned(values_C, sparkline_points);
+        }
+        if (const ChannelVerdict* verdict = verdict_of(channel.name)) {
+            const double time_min = test_.grid.time_s(test_.last_scan) / 60.0;
+            entry["state"] = to_string(verdict->state);
+            entry["n"] = verdict->n;
+            entry["window_rmse_C"] = number_or_null(verdict->window_rmse_C);
+            entry["steady_state_C"] = number_or_null(verdict->steady_state_C);
+            entry["steady_state_low_C"] = number_or_null(verdict->steady_state_low_C);
+            entry["steady_state_high_C"] = number_or_null(verdict->steady_state_high_C);
+            entry["equilibrium_time_min"] = number_or_null(verdict->equilibrium_time_min);
+            entry["time_left_min"] = number_or_null(std::max(0.0, verdict->equilibrium_time_min - time_min));
+            entry["reason"] = verdict->reason;
+        }
+        list.push_back(std::move(entry));
+    }
+    return json{{"time_min", test_.id > 0 ? json(test_.grid.time_s(std::max<std::int64_t>(test_.last_scan, 0)) / 60.0)
+                                          : json(nullptr)},
+                {"channels", std::move(list)}};
+}
+
+Result<json> Daemon::samples_json(const json& params) const {
+    if (test_.id == 0) return bad_param("there is no test yet: start one first");
+    const auto from_scan = integer_param(params, "from_scan", 0);
+    if (!from_scan) return std::unexpected(from_scan.error());
+    const auto limit = integer_param(params, "limit", 2000);
+    if (!limit || *limit < 1 || *limit > 10'000) return bad_param("limit: expected 1 to 10000 scans");
+    const auto wanted = text_param(params, "channel");
+    if (!wanted) return std::unexpected(wanted.error());
+    const auto& channels = options_.config.channels;
+    if (!wanted->empty() && std::ranges::find(channels, *wanted, &ChannelConfig::name) == channels.end()) {
+        return bad_param(fmt::format("channel: there is no {}", *wanted));
+    }
+    const auto scans = store_.read().scans(test_.id, std::max<std::int64_t>(*from_scan, 0), *from_scan + *limit - 1);
+    if (!scans) return std::unexpected(scans.error());
+    json rows = json::array();
+    for (const ScanRecord& scan : *scans) {
+        json samples = json::object();
+        for (std::size_t i = 0; i < scan.samples.size() && i < channels.size(); ++i) {
+            if (wanted->empty() || channels[i].name == *wanted) samples[channels[i].name] = sample_json(scan.samples[i]);
+        }
+        rows.push_back({{"scan", scan.scan},
+                        {"time_s", scan.time_s},
+                        {"wall_ns", scan.wall_ns},
+                        {"status", to_string(scan.status)},
+                        {"samples", std::move(samples)}});
+    }
+    return json{{"test", test_.id}, {"scans", std::move(rows)}};
+}
+
+Result<json> Daemon::curve_json(const json& params) const {
+    const auto channel = text_param(params, "channel");
+    if (!channel) return std::unexpected(channel.error());
+    json curves = json::array();
+    for (const ChannelVerdict& verdict : test_.declarations.standing()) {
+        if (!channel->empty() && verdict.channel != *channel) continue;
+        const json whole = verdict_to_json(verdict);
+        curves.push_back({{"channel", verdict.channel},
+                          {"n", verdict.n},
+                          {"window_end_min", whole["window_end_min"]},
+                          {"rmse_by_n_C", whole["rmse_by_n_C"]}});
+    }
+    if (!channel->empty() && curves.empty()) {
+        return bad_param(fmt::format("channel: no identification of {} yet", *channel));
+    }
+    return json{{"curves", std::move(curves)}};
+}
+
+Result<json> Daemon::predictions_json() const {
+    json list = json::array();
+    for (const ChannelVerdict& verdict : test_.declarations.standing()) list.push_back(verdict_to_json(verdict));
+    return json{{"test_stopped_at_min", is_measuring(test_.state) || test_.id == 0
+                                            ? json(nullptr)
+                                            : json(test_.grid.time_s(test_.last_scan) / 60.0)},
+                {"stop", test_.decision.stop},
+                {"reason", test_.decision.reason},
+                {"channels", std::move(list)}};
+}
+
+Result<json> Daemon::events_json(const json& params) const {
+    const auto after = integer_param(params, "after_id", 0);
+    if (!after) return std::unexpected(after.error());
+    const auto limit = integer_param(params, "limit", 200);
+    if (!limit || *limit < 1 || *limit > 10'000) return bad_param("limit: expected 1 to 10000 events");
+    const auto events = store_.read().events(std::nullopt, *after, *limit);
+    if (!events) return std::unexpected(events.error());
+    json list = json::array();
+    for (const EventRecord& event : *events) {
+        list.push_back({{"id", event.id},
+                        {"test", event.test_id ? json(*event.test_id) : json(nullptr)},
+                        {"wall_ns", event.wall_ns},
+                        {"time_s", event.time_s ? json(*event.time_s) : json(nullptr)},
+                        {"kind", event.kind},
+                        {"channel", event.channel ? json(*event.channel) : json(nullptr)},
+                        {"message", event.message}});
+    }
+    return json{{"events", std::move(list)}};
+}
+
+Result<json> Daemon::health_json() const {
+    json lines = json::array();
+    for (const auto& line : lines_) {
+        const LineHealth health = line->health();
+        json units = json::array();
+        for (const LineHealth::Unit& unit : health.units) {
+            units.push_back({{"unit", unit.name},
+                             {"answering", unit.answering},
+                             {"round_trip_ms", unit.round_trip_ms},
+                             {"failures", unit.failures},
+                             {"last_error", unit.last_error}});
+        }
+        lines.push_back({{"line", health.name},
+                         {"requests", health.counters.requests},
+                         {"replies", health.counters.replies},
+                         {"exceptions", health.counters.exceptions},
+                         {"timeouts", health.counters.timeouts},
+                         {"bad_frames", health.counters.bad_frames},
+                         {"stray_bytes", health.counters.stray_bytes},
+                         {"connects", health.counters.connects},
+                         {"connect_failures", health.counters.connect_failures},
+                         {"units", std::move(units)}});
+    }
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    const auto seconds = [](const timeval& time) {
+        return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_usec) * 1e-6;
+    };
+    const SocketServer::Counters counters = server_.counters();
+    return json{{"up_s", static_cast<double>(clock_.monotonic_ns() - started_ns_) * 1e-9},
+                {"scans", {{"ok", scans_ok_}, {"late", scans_late_}, {"missed", scans_missed_}}},
+                {"lateness_ms", figures_json(lateness_ms_)},
+                {"commit_ms", figures_json(commit_ms_)},
+                {"identification_s", figures_json(identification_s_)},
+                {"unstored_scans", unstored_.size()},
+                {"lost_scans", lost_scans_},
+                {"wal_bytes", store_.wal_bytes()},
+                {"database_bytes", store_.database_bytes()},
+                {"cpu_s", seconds(usage.ru_utime) + seconds(usage.ru_stime)},
+                {"max_rss_bytes", usage.ru_maxrss * 1024},
+                {"clients", counters.clients},
+                {"lines", std::move(lines)}};
+}
+
+Result<json> Daemon::on_start(const json& params) {
+    if (is_measuring(test_.state)) {
+        return bad_param(fmt::format("test {} \"{}\" is {}: stop it first", test_.id, test_.name, to_string(test_.state)));
+    }
+    const auto name = text_param(params, "name");
+    const auto machine = text_param(params, "machine");
+    if (!name || !machine) return std::unexpected(!name ? name.error() : machine.error());
+    const TestConfig& defaults = options_.config.test;
+    const auto id = start_test(name->empty() ? defaults.name : *name, machine->empty() ? defaults.machine : *machine);
+    if (!id) return std::unexpected(id.error());
+    return json{{"test", *id}, {"state", to_string(test_.state)}};
+}
+
+Result<json> Daemon::on_stop(const json& params) {
+    if (!is_measuring(test_.state)) return bad_param("no test is running");
+    const auto reason = text_param(params, "reason");
+    if (!reason) return std::unexpected(reason.error());
+    const auto abort = params.find("abort");
+    if (abort != params.end() && !abort->is_boolean()) return bad_param("abort: expected true or false");
+    const bool aborts = abort != params.end() && abort->get<bool>();
+    end_test(aborts ? TestEvent::abort : TestEvent::stop, reason->empty() ? "by hand" : *reason);
+    return json{{"test", test_.id}, {"state", to_string(test_.state)}};
+}
+
+Result<json> Daemon::on_annotate(const json& params) {
+    const auto message = text_param(params, "message");
+    if (!message) return std::unexpected(message.error());
+    if (message->empty()) return bad_param("message: expected a text");
+    const auto channel = text_param(params, "channel");
+    if (!channel) return std::unexpected(channel.error());
+    event("annotation", *message, channel->empty() ? std::nullopt : std::optional(*channel));
+    return json{{"test", test_.id}};
+}
+
+}  // namespace thermbal

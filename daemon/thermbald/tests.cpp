@@ -1,0 +1,122 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "config/load.hpp"
+#include "daemon.hpp"
+#include "report/verdict_json.hpp"
+
+namespace thermbal {
+namespace {
+
+std::int64_t period_ns_of(double period_s) { return std::llround(period_s * 1e9); }
+
+std::string describe_source(const Config& config, const ChannelConfig& channel) {
+    const UnitConfig& unit = config.units[channel.unit];
+    return fmt::format("line {}, unit {} (id {}), input {}", config.lines[unit.line].link.name, unit.name, unit.unit_id,
+                       channel.input);
+}
+
+}  // namespace
+
+Result<TestId> Daemon::start_test(const std::string& name, const std::string& machine) {
+    const Config& config = options_.config;
+    TestRecord record{.name = name,
+                      .machine = machine,
+                      .config_toml = explain_config(config),
+                      .version = options_.version,
+                      .period_s = config.test.period_s,
+                      .keep_measuring = config.test.keep_measuring,
+                      .started = now(),
+                      .boot_id = options_.boot_id,
+                      .channels = {}};
+    for (const ChannelConfig& channel : config.channels) {
+        record.channels.push_back({channel.name, channel.role == ChannelConfig::Role::ambient ? "ambient" : "structure",
+                                   channel.place, channel.required, describe_source(config, channel)});
+    }
+    const auto id = store_.begin_test(record);
+    if (!id) return id;
+
+    test_ = LiveTest{};
+    test_.id = *id;
+    test_.state = TestState::running;
+    test_.name = name;
+    test_.started_wall_ns = record.started.wall_ns;
+    test_.grid = {record.started.monotonic_ns, period_ns_of(record.period_s)};
+    begin_window(record.period_s);
+    follow_grid(test_.grid, 0);
+    event("started", fmt::format("test {} \"{}\" of {}", *id, name, machine.empty() ? "a machine without name" : machine));
+    return id;
+}
+
+void Daemon::begin_window(double period_s) {
+    test_.window = TestWindow{0.0, period_s, 0, {}, {}};
+    for (const ChannelConfig& channel : options_.config.channels) test_.window.channels.push_back({channel.name, {}});
+    newest_good_C_.assign(options_.config.channels.size(), no_value);
+}
+
+/// Goes on with a test that was open when the daemon ended: the same test, the scans that are stored, the grid where
+/// it is now. What lies between becomes missed scans.
+void Daemon::resume(ResumedTest resumed) {
+    const StoredTest& stored = resumed.test;
+    const TestRecord& record = stored.record;
+    test_ = LiveTest{};
+    test_.id = stored.id;
+    test_.state = stored.state;
+    test_.name = record.name;
+    test_.started_wall_ns = record.started.wall_ns;
+    test_.grid = {record.started.monotonic_ns, period_ns_of(record.period_s)};
+    const std::int64_t last_scan = stored.last_scan.value_or(-1);
+    if (record.boot_id != options_.boot_id) {
+        // Another boot, another monotonic clock: the wall clock says how long the test has been going.
+        const std::int64_t elapsed_ns = clock_.wall_ns() - record.started.wall_ns;
+        test_.grid.start_ns = clock_.monotonic_ns() - elapsed_ns;
+        if (test_.grid.scan_at(clock_.monotonic_ns()) <= last_scan) {
+            // The wall clock was set back meanwhile. Go on behind what is stored; how long the gap was is not known.
+            test_.grid.start_ns = clock_.monotonic_ns() - (last_scan + 1) * test_.grid.period_ns;
+        }
+    }
+
+    begin_window(record.period_s);
+    const auto position = [&](const std::string& name) {
+        const auto& channels = options_.config.channels;
+        return static_cast<std::size_t>(std::ranges::find(channels, name, &ChannelConfig::name) - channels.begin());
+    };
+    for (const ScanRecord& scan : resumed.scans) {
+        Scan again{.scan = scan.scan, .samples = std::vector<Sample>(options_.config.channels.size())};
+        for (std::size_t i = 0; i < scan.samples.size(); ++i) {
+            const std::size_t channel = position(record.channels[i].name);
+            if (channel < again.samples.size()) again.samples[channel] = scan.samples[i];
+        }
+        grow_window(again);
+    }
+    std::vector<ChannelVerdict> verdicts;
+    for (const IdentificationRecord& identification : resumed.identifications) {
+        auto json = nlohmann::json::parse(identification.verdict_json, nullptr, false);
+        auto verdict = verdict_from_json(json);
+        if (verdict) verdicts.push_back(std::move(*verdict));
+        test_.identified_scan = identification.window_end_scan;
+        test_.submitted_scan = identification.window_end_scan;
+    }
+    test_.declarations.restore(std::move(verdicts));
+    follow_grid(test_.grid, last_scan + 1);
+    const std::int64_t missed = test_.grid.scan_at(clock_.monotonic_ns()) - last_scan - 1;
+    event("resumed", fmt::format("test {} \"{}\" goes on: {} scans are stored, about {} were missed", test_.id,
+                                 test_.name, last_scan + 1, std::max<std::int64_t>(missed, 0)));
+}
+
+void Daemon::follow_grid(Grid grid, std::int64_t first_scan) {
+    ++generation_;
+    std::vector<std::size_t> channel_line;
+    for (const ChannelConfig& channel : options_.config.channels) {
+        channel_line.push_back(options_.config.units[channel.unit].line);
+    }
+    assembler_.emplace(grid, generation_, first_scan, std::move(channel_line), options_.config.lines.size());
+    for (const auto& reader : readers_) reader->follow(grid, generation_, first_scan);
+    arm_close_timer();
+}
+
+}  // namespace thermbal
