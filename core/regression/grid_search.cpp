@@ -1,82 +1,31 @@
 #include "regression/grid_search.hpp"
 
 #include <algorithm>
-#include <numeric>
 
-#include "regression/kernel.hpp"
-#include "regression/libsvm_solver.hpp"
+#include "libsvm_grid.hpp"
+#include "low_rank_grid.hpp"
 
 namespace thermbal {
-namespace {
 
-SvrParameters parameters_at(double C, double sigma, const SweepOptions& options) {
-    return {.C = C, .sigma = sigma, .epsilon = options.epsilon, .tolerance = options.solver_tolerance};
-}
-
-double held_out_mse(const Eigen::MatrixXd& kernel, const Fold& fold, const SvrFit& fit,
-                    std::span<const double> targets) {
-    double sum = 0.0;
-    for (const std::size_t row : fold.held_out_rows) {
-        double predicted = fit.bias;
-        for (std::size_t k = 0; k < fold.training_rows.size(); ++k) {
-            if (fit.coefficient[k] == 0.0) continue;
-            predicted += fit.coefficient[k] * kernel(static_cast<Eigen::Index>(fold.training_rows[k]),
-                                                     static_cast<Eigen::Index>(row));
-        }
-        sum += (predicted - targets[row]) * (predicted - targets[row]);
-    }
-    return sum / static_cast<double>(fold.held_out_rows.size());
-}
-
-std::vector<std::size_t> all_rows(const LagProblem& problem) {
-    std::vector<std::size_t> rows(problem.rows());
-    std::iota(rows.begin(), rows.end(), std::size_t{0});
-    return rows;
-}
-
-}  // namespace
-
-Result<std::vector<double>> cross_validate_by_libsvm(const LagProblem& problem, const SweepOptions& options,
-                                                     const Cancelled& cancelled) {
-    const auto folds = make_folds(problem.rows(), options.folds, options.fold_kind, options.fold_seed);
-    const auto distances = squared_distances(problem);
-    std::vector<double> mean_mse;
-    for (const double sigma : options.sigma_grid) {
-        const auto kernel = gaussian_kernel(distances, sigma);
-        const LibsvmSolver solver(kernel);
-        for (const double C : options.C_grid) {
-            double sum = 0.0;
-            for (const Fold& fold : folds) {
-                if (cancelled()) return fail(NextStep::stop, "the sweep was cancelled");
-                const auto fit =
-                    solver.fit(fold.training_rows, problem.targets(), parameters_at(C, sigma, options));
-                if (!fit) return std::unexpected(fit.error());
-                sum += held_out_mse(kernel, fold, *fit, problem.targets());
-            }
-            mean_mse.push_back(sum / static_cast<double>(folds.size()));
-        }
-    }
-    return mean_mse;
-}
-
-Result<SvrFit> fit_all_rows(const LagProblem& problem, double C, double sigma, const SweepOptions& options) {
-    const LibsvmSolver solver(gaussian_kernel(squared_distances(problem), sigma));
-    return solver.fit(all_rows(problem), problem.targets(), parameters_at(C, sigma, options));
+Result<std::vector<double>> cross_validate_grid(const LagProblem& problem, const SweepOptions& options,
+                                                const Cancelled& cancelled) {
+    return options.solver == SvrSolver::libsvm ? cross_validate_by_libsvm(problem, options, cancelled)
+                                               : cross_validate_low_rank(problem, options, cancelled);
 }
 
 Result<GridChoice> search_grid(const LagProblem& problem, const SweepOptions& options,
                                const Cancelled& cancelled) {
+    if (options.solver == SvrSolver::low_rank) return search_grid_low_rank(problem, options, cancelled);
     const auto mean_mse = cross_validate_by_libsvm(problem, options, cancelled);
     if (!mean_mse) return std::unexpected(mean_mse.error());
     const auto best = static_cast<std::size_t>(std::ranges::min_element(*mean_mse) - mean_mse->begin());
-    GridChoice choice;
-    choice.sigma = options.sigma_grid[best / options.C_grid.size()];
-    choice.C = options.C_grid[best % options.C_grid.size()];
-    choice.cv_mse_unit = (*mean_mse)[best];
-    auto fit = fit_all_rows(problem, choice.C, choice.sigma, options);
-    if (!fit) return std::unexpected(fit.error());
-    choice.fit = std::move(*fit);
-    return choice;
+    return GridChoice{options.C_grid[best % options.C_grid.size()],
+                      options.sigma_grid[best / options.C_grid.size()], (*mean_mse)[best]};
+}
+
+Result<SvrModel> fit_model(const LagProblem& problem, double C, double sigma, const SweepOptions& options) {
+    return options.solver == SvrSolver::libsvm ? fit_model_by_libsvm(problem, C, sigma, options)
+                                               : fit_model_low_rank(problem, C, sigma, options);
 }
 
 }  // namespace thermbal

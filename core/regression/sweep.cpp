@@ -62,15 +62,16 @@ Result<LagFit> identify_at(std::span<const double> filtered_C, std::size_t n, co
     if (!problem) return std::unexpected(problem.error());
     const auto choice = search_grid(*problem, options, cancelled);
     if (!choice) return std::unexpected(choice.error());
-    const SvrModel model(*problem, choice->fit, choice->sigma);
+    const auto model = fit_model(*problem, choice->C, choice->sigma, options);
+    if (!model) return std::unexpected(model.error());
     LagFit fit;
     fit.n = n;
     fit.C = choice->C;
     fit.sigma = choice->sigma;
     fit.cv_rmse_C = problem->scale.range_C * std::sqrt(choice->cv_mse_unit);
-    fit.support_vectors = model.support_vectors();
-    judge_over_window(fit, run_over_window(*problem, model, options.free_run), filtered_C);
-    judge_ahead(fit, run_until_settled(model, problem->scale, newest(*problem), options.free_run));
+    fit.support_vectors = model->support_vectors();
+    judge_over_window(fit, run_over_window(*problem, *model, options.free_run), filtered_C);
+    judge_ahead(fit, run_until_settled(*model, problem->scale, newest(*problem), options.free_run));
     return fit;
 }
 
@@ -135,21 +136,21 @@ Result<Prediction> predict(std::span<const double> filtered_C, std::size_t n, do
     if (auto checked = check_window(filtered_C, at_point); !checked) return std::unexpected(checked.error());
     const auto problem = make_lag_problem(filtered_C, n, options.smallest_range_C);
     if (!problem) return std::unexpected(problem.error());
-    const auto svr = fit_all_rows(*problem, C, sigma, options);
-    if (!svr) return std::unexpected(svr.error());
-    const SvrModel model(*problem, *svr, sigma);
+    const auto model = fit_model(*problem, C, sigma, options);
+    if (!model) return std::unexpected(model.error());
 
     Prediction prediction;
     prediction.fit = {.n = n, .C = C, .sigma = sigma, .cv_rmse_C = std::numeric_limits<double>::quiet_NaN()};
-    prediction.fit.support_vectors = model.support_vectors();
-    const FreeRun over_window = run_over_window(*problem, model, options.free_run);
+    prediction.fit.support_vectors = model->support_vectors();
+    const FreeRun over_window = run_over_window(*problem, *model, options.free_run);
     judge_over_window(prediction.fit, over_window, filtered_C);
-    judge_ahead(prediction.fit, run_until_settled(model, problem->scale, newest(*problem), options.free_run));
+    judge_ahead(prediction.fit,
+                run_until_settled(*model, problem->scale, newest(*problem), options.free_run));
     prediction.window_C.assign(filtered_C.begin(), filtered_C.begin() + static_cast<std::ptrdiff_t>(n));
     prediction.window_C.insert(prediction.window_C.end(), over_window.temperature_C.begin(),
                                over_window.temperature_C.end());
     prediction.predicted_C =
-        run_freely(model, problem->scale, newest(*problem), horizon, options.free_run).temperature_C;
+        run_freely(*model, problem->scale, newest(*problem), horizon, options.free_run).temperature_C;
     return prediction;
 }
 

@@ -102,6 +102,7 @@ TEST(GridSearch, ErrorsAreThoseOfGridSearchCV) {
     options.C_grid = {0.25, 4.0, 256.0};
     options.sigma_grid = {0.5, 4.0, 32.0};
     options.solver_tolerance = 1e-5;
+    options.solver = SvrSolver::libsvm;
     for (const std::size_t lags : {1, 8, 30}) {
         for (const std::size_t samples : {97, 192}) {
             const auto window = testing::filtered_warm_up(testing::two_constants, samples, lags);
@@ -110,7 +111,7 @@ TEST(GridSearch, ErrorsAreThoseOfGridSearchCV) {
             request += " 0.25,4.0,256.0 0.5,4.0,32.0" + testing::to_words(window) + "\n";
             const auto answer = testing::ask_python("regression/svr_peer.py", request);
             const auto errors =
-                cross_validate_by_libsvm(*make_lag_problem(window, lags, 0.0), options, never_cancelled);
+                cross_validate_grid(*make_lag_problem(window, lags, 0.0), options, never_cancelled);
             ASSERT_TRUE(errors);
             ASSERT_EQ(answer.size(), 1u);
             ASSERT_EQ(answer[0].size(), errors->size());

@@ -15,6 +15,7 @@ namespace {
 /// A small grid, so that the libsvm path is quick.
 SweepOptions quick() {
     SweepOptions options;
+    options.solver = SvrSolver::libsvm;
     options.last_lag = 6;
     options.C_grid = {1.0, 64.0};
     options.sigma_grid = {4.0, 32.0};
@@ -86,6 +87,7 @@ TEST(Sweep, ALinearAutoregressionSettlesWhereItsEquationSays) {
         for (std::size_t k = 0; k < 40; ++k) window.push_back(analytic_C(k));  // 86 % of the way
         SweepOptions options;
         options.epsilon = 1e-5;
+        options.solver = SvrSolver::libsvm;
         options.solver_tolerance = 1e-6;
         const auto prediction = predict(window, 1, 4096.0, 32.0, 600, options);
         ASSERT_TRUE(prediction);

@@ -39,22 +39,28 @@ double dual_objective(const SvrFit& fit, std::span<const double> targets, double
     return objective;
 }
 
-/// A fit on lagged rows, reduced to its support vectors. Predicts one step on the [0, 1] scale.
+/// A function sum_i c_i k(x_i, x) + bias on lagged rows. Predicts one step on the [0, 1] scale.
 class SvrModel {
   public:
+    /// The fit of all rows, by its support vectors.
     SvrModel(const LagProblem& problem, const SvrFit& fit, double sigma);
+    /// The same function by other rows: `coefficients` one a row of `rows`.
+    SvrModel(const LagProblem& problem, const std::vector<std::size_t>& rows,
+             std::vector<double> coefficients, double bias, double sigma, std::size_t support_vectors);
 
     std::size_t lags() const { return lags_; }
-    std::size_t support_vectors() const { return coefficients_.size(); }
+    /// Of the fit, however many rows the function is written with.
+    std::size_t support_vectors() const { return support_vectors_; }
     /// `newest_last`: the lags() values before the one predicted.
     double predict_unit(std::span<const double> newest_last) const;
 
   private:
     std::size_t lags_;
+    std::size_t support_vectors_;
     double minus_inverse_sigma2_;
     double bias_;
     std::vector<double> coefficients_;
-    std::vector<double> vectors_;  ///< lags_ x support vectors: one lag of all of them after the other
+    std::vector<double> vectors_;  ///< one lag of all rows after the other
 };
 
 }  // namespace thermbal

@@ -14,7 +14,8 @@
 namespace thermbal {
 
 enum class SvrSolver {
-    libsvm,  ///< the reference
+    low_rank,  ///< ours: Newton's method on low-rank kernels; the exact optimum, hundreds of times faster
+    libsvm,    ///< the reference
 };
 
 /// Every choice of the identification. What the paper (Feng, Xia, Sun, Fu 2015) fixes: epsilon = 0.001, n = 1
@@ -30,8 +31,8 @@ struct SweepOptions {
     FoldKind fold_kind = FoldKind::contiguous;
     std::uint64_t fold_seed = 1;     ///< of shuffled folds
     double smallest_range_C = 1e-6;  ///< a window with less is refused as flat
-    SvrSolver solver = SvrSolver::libsvm;
-    double solver_tolerance = 1e-3;  ///< libsvm's and scikit-learn's default
+    SvrSolver solver = SvrSolver::low_rank;
+    double solver_tolerance = 1e-3;  ///< of libsvm alone: its and scikit-learn's default
     FreeRunOptions free_run;
 
     /// Errors (refuse_input) name the field, its value and the bound.
@@ -62,6 +63,9 @@ struct SweepResult {
 using Cancelled = std::function<bool()>;
 inline bool never_cancelled() {
     return false;
+}
+inline std::unexpected<Error> sweep_cancelled() {
+    return fail(NextStep::stop, "the sweep was cancelled");
 }
 
 /// Fewest samples a sweep with these options takes: two rows a fold at the largest n.

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "regression/vector_loops.hpp"
+
+namespace thermbal {
+
+/// epsilon-SVR on explicit features, minimising
+///     1/2 |w|^2 + C sum_i max(0, |y_i - w . x_i - b| - epsilon)
+/// by Newton's method on the loss with its kink smoothed (an epsilon-insensitive Huber loss), the smoothing
+/// being taken from step to step towards 0. The slope of the smoothed loss at each row is the row's dual
+/// coefficient: it always keeps |c_i| <= C, and a smoothing h moves the fit by at most about h.
+/// Deterministic; one object a thread.
+class TubeSolver {
+  public:
+    struct State {
+        Eigen::VectorXd weights;
+        double bias = 0.0;
+    };
+
+    struct Schedule {
+        double first_smoothing = 0.5;
+        double factor = 0.1;
+        double last_smoothing = 1e-6;
+        int most_steps = 100;  ///< of Newton, at one smoothing
+    };
+
+    /// `features`: rows x rank.
+    TubeSolver(Eigen::MatrixXd features, Eigen::VectorXd targets, double epsilon);
+
+    /// Weights 0, bias the median target.
+    State cold_start() const;
+
+    /// Goes on from `start`. False if a smoothing took more than most_steps: the state is then not the
+    /// optimum.
+    [[nodiscard]] bool fit(double C, const State& start, const Schedule& schedule);
+
+    const State& state() const { return state_; }
+    /// alpha - alpha* of every row.
+    const Eigen::VectorXd& coefficients() const { return slopes_; }
+    /// No row is held back by C: every larger C has the same optimum.
+    bool is_free_of_C() const;
+    /// Primal minus dual objective: no other fit on these features has a primal objective smaller by more
+    /// than this.
+    double duality_gap() const;
+    long newton_steps() const { return newton_steps_; }
+
+  private:
+    [[nodiscard]] bool descend(double smoothing, double still, int most_steps);
+    void take_slopes();
+    void find_bending_rows();
+    void newton_direction();
+    double step_length();
+    void centre_undetermined_bias();
+
+    Eigen::MatrixXd features_;
+    Eigen::MatrixXd by_row_;  ///< features_ transposed: one row's features side by side
+    Eigen::VectorXd targets_;
+    double epsilon_;
+
+    vector_loops::Tube tube_;
+    State state_;
+    Eigen::VectorXd residuals_;
+    Eigen::VectorXd slopes_, new_slopes_;
+    Eigen::VectorXd slope_sum_;  ///< sum of slopes_(i) * row i
+    bool slope_sum_is_fresh_ = false;
+    std::vector<Eigen::Index> bending_;  ///< rows where the loss is quadratic
+    Eigen::VectorXd gradient_;
+    double bias_gradient_ = 0.0;
+    Eigen::VectorXd direction_;
+    double bias_direction_ = 0.0;
+    Eigen::VectorXd change_;  ///< of the prediction of every row along the direction
+    long newton_steps_ = 0;
+};
+
+}  // namespace thermbal

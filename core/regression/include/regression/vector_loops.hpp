@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstddef>
+
+/// The loops in which the time goes, compiled once for every width of vector unit and chosen at run time. All
+/// of them give the same bits on every processor: sums have eight fixed lanes, and multiply and add are not
+/// fused.
+namespace thermbal::vector_loops {
+
+/// out[i] = constant + sum over columns k of factor[k] * matrix[i + k * rows].
+void multiply_columns(const double* matrix, std::size_t rows, std::size_t columns, const double* factor,
+                      double constant, double* out);
+
+/// out[i] -= sum over columns k of factor[k] * matrix[i + k * rows].
+void subtract_columns(const double* matrix, std::size_t rows, std::size_t columns, const double* factor,
+                      double* out);
+
+/// distance[i] = sum over l < lags of (series[i + l] - point[l])^2, for i < rows.
+void squared_distances_to(const double* series, std::size_t rows, const double* point, std::size_t lags,
+                          double* distance);
+
+/// values[i] = exp(factor * values[i]); factor * values[i] must lie in [-700, 0]. Error below 2e-16.
+void scaled_exp(double* values, std::size_t count, double factor);
+
+/// The epsilon-insensitive loss with its kink smoothed over `smoothing`: its slope is
+/// C * clamp((|residual| - epsilon) / smoothing, 0, 1), with the sign of the residual.
+struct Tube {
+    double C = 1.0;
+    double epsilon = 0.001;
+    double smoothing = 1.0;
+};
+
+void loss_slopes(const double* residual, std::size_t count, const Tube& tube, double* slope);
+
+/// First and second derivative along residual - t * change: sums of slope * change and of change^2 where it
+/// bends.
+struct Derivatives {
+    double first = 0.0;
+    double second = 0.0;
+};
+Derivatives derivatives_along(const double* residual, const double* change, double t, std::size_t count,
+                              const Tube& tube);
+
+}  // namespace thermbal::vector_loops

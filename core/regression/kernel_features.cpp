@@ -1,0 +1,55 @@
+#include "regression/kernel_features.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Dense>
+
+#include "regression/vector_loops.hpp"
+
+namespace thermbal {
+
+KernelFeatures kernel_features(const LagProblem& problem, double sigma, double tolerance) {
+    const std::size_t rows = problem.rows();
+    std::vector<double> left_over(rows, 1.0);
+    std::vector<double> columns;
+    std::vector<double> pivot_row;
+    KernelFeatures kernel;
+    while (kernel.pivots.size() < rows) {
+        const auto largest = std::ranges::max_element(left_over);
+        if (!(*largest > tolerance)) break;
+        const std::size_t rank = kernel.pivots.size();
+        const auto pivot = static_cast<std::size_t>(largest - left_over.begin());
+        pivot_row.resize(rank);
+        for (std::size_t k = 0; k < rank; ++k) pivot_row[k] = columns[k * rows + pivot];
+        const double diagonal = std::sqrt(*largest);
+        columns.resize((rank + 1) * rows);
+        double* column = columns.data() + rank * rows;
+        vector_loops::squared_distances_to(problem.unit.data(), rows, problem.input(pivot).data(),
+                                           problem.lags, column);
+        vector_loops::scaled_exp(column, rows, -1.0 / (sigma * sigma));
+        vector_loops::subtract_columns(columns.data(), rows, rank, pivot_row.data(), column);
+        for (std::size_t i = 0; i < rows; ++i) {
+            column[i] /= diagonal;
+            left_over[i] -= column[i] * column[i];
+        }
+        left_over[pivot] = 0.0;
+        kernel.pivots.push_back(pivot);
+    }
+    kernel.features = Eigen::Map<const Eigen::MatrixXd>(columns.data(), static_cast<Eigen::Index>(rows),
+                                                        static_cast<Eigen::Index>(kernel.pivots.size()));
+    return kernel;
+}
+
+double feature_tolerance(double sigma) {
+    return std::min(1e-7, 2.5e-8 / (sigma * sigma));
+}
+
+std::vector<double> pivot_coefficients(const KernelFeatures& kernel, const Eigen::VectorXd& weights) {
+    const std::vector<Eigen::Index> pivots(kernel.pivots.begin(), kernel.pivots.end());
+    const Eigen::MatrixXd lower = kernel.features(pivots, Eigen::all);
+    const Eigen::VectorXd solved = lower.transpose().triangularView<Eigen::Upper>().solve(weights);
+    return {solved.begin(), solved.end()};
+}
+
+}  // namespace thermbal

@@ -1,0 +1,195 @@
+#include "low_rank_grid.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+#include <optional>
+
+#include <Eigen/Dense>
+#include <fmt/format.h>
+
+#include "regression/kernel_features.hpp"
+#include "regression/tube_solver.hpp"
+
+namespace thermbal {
+namespace {
+
+using Schedule = TubeSolver::Schedule;
+
+constexpr double cross_validation_tolerance_factor = 10.0;
+constexpr Schedule cold{.first_smoothing = 0.5, .factor = 0.1, .last_smoothing = 1e-6};
+constexpr Schedule along_C{.first_smoothing = 0.03, .factor = 0.1, .last_smoothing = 1e-6};
+constexpr Schedule across_folds{.first_smoothing = 0.01, .factor = 0.1, .last_smoothing = 1e-6};
+/// For what the quicker ones did not bring to an end.
+constexpr Schedule patient{.first_smoothing = 0.5, .factor = 0.3, .last_smoothing = 1e-6, .most_steps = 1000};
+constexpr Schedule exact{.first_smoothing = 0.5, .factor = 0.1, .last_smoothing = 1e-9, .most_steps = 1000};
+
+std::vector<Eigen::Index> to_indices(const std::vector<std::size_t>& rows) {
+    return {rows.begin(), rows.end()};
+}
+
+/// One fold at one sigma: a solver on its training rows, and what is held out.
+class FoldFits {
+  public:
+    FoldFits(const KernelFeatures& kernel, const Fold& fold, const Eigen::VectorXd& targets, double epsilon)
+        : solver_(kernel.features(to_indices(fold.training_rows), Eigen::all),
+                  targets(to_indices(fold.training_rows)), epsilon),
+          held_out_(kernel.features(to_indices(fold.held_out_rows), Eigen::all)),
+          held_out_targets_(targets(to_indices(fold.held_out_rows))) {}
+
+    /// Held-out mean squared error of the fit at C, which is searched from `start`.
+    double mse(double C, const TubeSolver::State& start, const Schedule& schedule) {
+        if (!solver_.fit(C, start, schedule)) {
+            // The state after the patient schedule is used as it is: 1000 steps at one smoothing have not
+            // been seen to fail.
+            static_cast<void>(solver_.fit(C, solver_.cold_start(), patient));
+        }
+        const Eigen::VectorXd error =
+            ((held_out_ * solver_.state().weights).array() + solver_.state().bias).matrix() -
+            held_out_targets_;
+        return error.squaredNorm() / static_cast<double>(error.size());
+    }
+
+    const TubeSolver& solver() const { return solver_; }
+
+  private:
+    TubeSolver solver_;
+    Eigen::MatrixXd held_out_;
+    Eigen::VectorXd held_out_targets_;
+};
+
+/// A C at the sigma in hand, after its first fold.
+struct Candidate {
+    std::size_t C_index = 0;
+    double first_mse = 0.0;
+    TubeSolver::State state;
+};
+
+/// Cross-validation of every C at one sigma.
+class SigmaColumn {
+  public:
+    SigmaColumn(const LagProblem& problem, double sigma, const std::vector<Fold>& folds,
+                const SweepOptions& options)
+        : folds_(folds),
+          options_(options),
+          targets_(Eigen::Map<const Eigen::VectorXd>(problem.targets().data(),
+                                                     static_cast<Eigen::Index>(problem.rows()))),
+          kernel_(
+              kernel_features(problem, sigma, cross_validation_tolerance_factor * feature_tolerance(sigma))),
+          fits_(folds.size()) {}
+
+    /// The first fold along C, each from the one before. Ends where a larger C changes nothing any more.
+    Result<std::vector<Candidate>> first_fold(const Cancelled& cancelled) {
+        std::vector<Candidate> candidates;
+        FoldFits& fold = fits(0);
+        TubeSolver::State state = fold.solver().cold_start();
+        for (std::size_t k = 0; k < options_.C_grid.size(); ++k) {
+            if (cancelled()) return sweep_cancelled();
+            const double mse = fold.mse(options_.C_grid[k], state, k == 0 ? cold : along_C);
+            state = fold.solver().state();
+            candidates.push_back({k, mse, state});
+        }
+        return candidates;
+    }
+
+    /// The mean over folds, or nothing as soon as it is sure to be above `bound`.
+    Result<std::optional<double>> mean_mse(const Candidate& candidate, double bound,
+                                           const Cancelled& cancelled) {
+        const auto count = static_cast<double>(folds_.size());
+        double sum = candidate.first_mse;
+        for (std::size_t f = 1; f < folds_.size(); ++f) {
+            if (sum / count > bound) return std::nullopt;
+            if (cancelled()) return sweep_cancelled();
+            sum += fits(f).mse(options_.C_grid[candidate.C_index], candidate.state, across_folds);
+        }
+        return sum / count;
+    }
+
+  private:
+    FoldFits& fits(std::size_t f) {
+        if (!fits_[f]) fits_[f].emplace(kernel_, folds_[f], targets_, options_.epsilon);
+        return *fits_[f];
+    }
+
+    const std::vector<Fold>& folds_;
+    const SweepOptions& options_;
+    Eigen::VectorXd targets_;
+    KernelFeatures kernel_;
+    std::vector<std::optional<FoldFits>> fits_;
+};
+
+struct Best {
+    double mean_mse = std::numeric_limits<double>::infinity();
+    std::size_t sigma_index = 0;
+    std::size_t C_index = 0;
+
+    void offer(double mse, std::size_t sigma, std::size_t C) {
+        const bool earlier = sigma < sigma_index || (sigma == sigma_index && C < C_index);
+        if (mse < mean_mse || (mse == mean_mse && earlier)) *this = {mse, sigma, C};
+    }
+};
+
+Result<void> search_column(SigmaColumn& column, std::size_t sigma_index, Best& best,
+                           const Cancelled& cancelled) {
+    auto candidates = column.first_fold(cancelled);
+    if (!candidates) return std::unexpected(candidates.error());
+    std::ranges::stable_sort(*candidates, {}, &Candidate::first_mse);
+    for (const Candidate& candidate : *candidates) {
+        const auto mse = column.mean_mse(candidate, best.mean_mse, cancelled);
+        if (!mse) return std::unexpected(mse.error());
+        if (*mse) best.offer(**mse, sigma_index, candidate.C_index);
+    }
+    return {};
+}
+
+}  // namespace
+
+Result<GridChoice> search_grid_low_rank(const LagProblem& problem, const SweepOptions& options,
+                                        const Cancelled& cancelled) {
+    const auto folds = make_folds(problem.rows(), options.folds, options.fold_kind, options.fold_seed);
+    Best best;
+    // Wide kernels first: they are the cheapest and mostly hold the best point, which the others are measured
+    // against.
+    for (std::size_t sigma = options.sigma_grid.size(); sigma-- > 0;) {
+        SigmaColumn column(problem, options.sigma_grid[sigma], folds, options);
+        if (auto searched = search_column(column, sigma, best, cancelled); !searched) {
+            return std::unexpected(searched.error());
+        }
+    }
+    return GridChoice{options.C_grid[best.C_index], options.sigma_grid[best.sigma_index], best.mean_mse};
+}
+
+Result<std::vector<double>> cross_validate_low_rank(const LagProblem& problem, const SweepOptions& options,
+                                                    const Cancelled& cancelled) {
+    const auto folds = make_folds(problem.rows(), options.folds, options.fold_kind, options.fold_seed);
+    std::vector<double> all;
+    for (const double sigma : options.sigma_grid) {
+        SigmaColumn column(problem, sigma, folds, options);
+        const auto candidates = column.first_fold(cancelled);
+        if (!candidates) return std::unexpected(candidates.error());
+        for (const Candidate& candidate : *candidates) {
+            const auto mse = column.mean_mse(candidate, std::numeric_limits<double>::infinity(), cancelled);
+            if (!mse) return std::unexpected(mse.error());
+            all.push_back(**mse);
+        }
+    }
+    return all;
+}
+
+Result<SvrModel> fit_model_low_rank(const LagProblem& problem, double C, double sigma,
+                                    const SweepOptions& options) {
+    const KernelFeatures kernel = kernel_features(problem, sigma, 0.1 * feature_tolerance(sigma));
+    const Eigen::Map<const Eigen::VectorXd> targets(problem.targets().data(),
+                                                    static_cast<Eigen::Index>(problem.rows()));
+    TubeSolver solver(kernel.features, targets, options.epsilon);
+    if (!solver.fit(C, solver.cold_start(), exact)) {
+        return fail(NextStep::stop,
+                    fmt::format("the fit at n = {}, C = {}, sigma = {} did not come to an end", problem.lags,
+                                C, sigma));
+    }
+    const auto support = static_cast<std::size_t>((solver.coefficients().array() != 0.0).count());
+    return SvrModel(problem, kernel.pivots, pivot_coefficients(kernel, solver.state().weights),
+                    solver.state().bias, sigma, support);
+}
+
+}  // namespace thermbal

@@ -1,0 +1,206 @@
+#include "regression/tube_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <Eigen/Dense>
+
+namespace thermbal {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+TubeSolver::TubeSolver(MatrixXd features, VectorXd targets, double epsilon)
+    : features_(std::move(features)),
+      by_row_(features_.transpose()),
+      targets_(std::move(targets)),
+      epsilon_(epsilon),
+      residuals_(targets_.size()),
+      slopes_(VectorXd::Zero(targets_.size())),
+      new_slopes_(targets_.size()),
+      slope_sum_(VectorXd::Zero(features_.cols())),
+      change_(targets_.size()) {}
+
+TubeSolver::State TubeSolver::cold_start() const {
+    std::vector<double> sorted(targets_.begin(), targets_.end());
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::ranges::nth_element(sorted, middle);
+    return {VectorXd::Zero(features_.cols()), *middle};
+}
+
+bool TubeSolver::fit(double C, const State& start, const Schedule& schedule) {
+    state_ = start;
+    vector_loops::multiply_columns(features_.data(), static_cast<std::size_t>(features_.rows()),
+                                   static_cast<std::size_t>(features_.cols()), state_.weights.data(),
+                                   state_.bias, residuals_.data());
+    residuals_ = targets_ - residuals_;
+    tube_.C = C;
+    tube_.epsilon = epsilon_;
+    double smoothing = std::max(schedule.first_smoothing, schedule.last_smoothing);
+    while (smoothing > schedule.last_smoothing) {
+        if (!descend(smoothing, 0.3 * smoothing, schedule.most_steps)) return false;
+        smoothing = std::max(smoothing * schedule.factor, schedule.last_smoothing);
+    }
+    const bool converged = descend(smoothing, 1e-3 * smoothing, schedule.most_steps);
+    take_slopes();
+    centre_undetermined_bias();
+    return converged;
+}
+
+/// Newton steps at one smoothing, until one moves no prediction by more than `still`.
+bool TubeSolver::descend(double smoothing, double still, int most_steps) {
+    tube_.smoothing = smoothing;
+    slope_sum_is_fresh_ = false;
+    for (int step = 0; step < most_steps; ++step) {
+        ++newton_steps_;
+        take_slopes();
+        find_bending_rows();
+        gradient_ = state_.weights - slope_sum_;
+        bias_gradient_ = -slopes_.sum();
+        newton_direction();
+        vector_loops::multiply_columns(features_.data(), static_cast<std::size_t>(features_.rows()),
+                                       static_cast<std::size_t>(features_.cols()), direction_.data(),
+                                       bias_direction_, change_.data());
+        const double length = step_length();
+        if (length == 0.0) return true;
+        state_.weights += length * direction_;
+        state_.bias += length * bias_direction_;
+        residuals_ -= length * change_;
+        if (length * change_.lpNorm<Eigen::Infinity>() <= still) return true;
+    }
+    return false;
+}
+
+/// Few rows change their slope from one step to the next: the sum over rows is brought up to date by those
+/// alone.
+void TubeSolver::take_slopes() {
+    vector_loops::loss_slopes(residuals_.data(), static_cast<std::size_t>(residuals_.size()), tube_,
+                              new_slopes_.data());
+    if (!slope_sum_is_fresh_) {
+        slope_sum_.setZero();
+        slopes_.setZero();
+        slope_sum_is_fresh_ = true;
+    }
+    for (Index i = 0; i < slopes_.size(); ++i) {
+        if (new_slopes_(i) == slopes_(i)) continue;
+        slope_sum_ += (new_slopes_(i) - slopes_(i)) * by_row_.col(i);
+        slopes_(i) = new_slopes_(i);
+    }
+}
+
+void TubeSolver::find_bending_rows() {
+    bending_.clear();
+    for (Index i = 0; i < slopes_.size(); ++i) {
+        const double size = std::abs(slopes_(i));
+        if (size > 0.0 && size < tube_.C) bending_.push_back(i);
+    }
+}
+
+/// Solves (I + k X'X) d + k X'1 e = -g, k 1'(X d + 1 e) = -g_b, X the rows where the loss bends, k their
+/// curvature: in the space of the features or in that of the rows, whichever is smaller.
+void TubeSolver::newton_direction() {
+    const double curvature = tube_.C / tube_.smoothing;
+    const auto rows = static_cast<Index>(bending_.size());
+    const Index rank = features_.cols();
+    if (rows == 0) {
+        direction_ = -gradient_;
+        bias_direction_ = -bias_gradient_ / (1e-3 * curvature);
+        return;
+    }
+    const MatrixXd bent = by_row_(Eigen::all, bending_);
+    if (rows > rank) {
+        const VectorXd mean = bent.rowwise().mean();
+        const MatrixXd centred = bent.colwise() - mean;
+        MatrixXd hessian = MatrixXd::Zero(rank, rank);
+        hessian.selfadjointView<Eigen::Lower>().rankUpdate(centred, curvature);
+        hessian.diagonal().array() += 1.0;
+        direction_ = hessian.selfadjointView<Eigen::Lower>().llt().solve(mean * bias_gradient_ - gradient_);
+        bias_direction_ = -bias_gradient_ / (curvature * static_cast<double>(rows)) - mean.dot(direction_);
+        return;
+    }
+    MatrixXd gram = MatrixXd::Zero(rows, rows);
+    gram.selfadjointView<Eigen::Lower>().rankUpdate(bent.transpose());
+    gram.diagonal().array() += 1.0 / curvature;
+    const auto factor = gram.selfadjointView<Eigen::Lower>().llt();
+    const VectorXd without_bias = factor.solve(-(bent.transpose() * gradient_));
+    const VectorXd of_bias = factor.solve(VectorXd::Ones(rows));
+    bias_direction_ = (-bias_gradient_ - without_bias.sum()) / of_bias.sum();
+    direction_ = -gradient_ - bent * (without_bias + bias_direction_ * of_bias);
+}
+
+/// The objective along the direction is convex and piecewise quadratic: safeguarded Newton to a slope a fifth
+/// of the first.
+double TubeSolver::step_length() {
+    const double first_slope = gradient_.dot(direction_) + bias_gradient_ * bias_direction_;
+    if (!(first_slope < 0.0)) return 0.0;
+    const double along = state_.weights.dot(direction_);
+    const double square = direction_.squaredNorm();
+    const double enough = 0.2 * std::abs(first_slope);
+    double low = 0.0;
+    double high = std::numeric_limits<double>::infinity();
+    double t = 1.0;
+    for (int trial = 0; trial < 60; ++trial) {
+        const auto loss = vector_loops::derivatives_along(residuals_.data(), change_.data(), t,
+                                                          static_cast<std::size_t>(residuals_.size()), tube_);
+        const double slope = along + t * square - loss.first;
+        if (std::abs(slope) <= enough) break;
+        (slope < 0.0 ? low : high) = t;
+        const double next = t - slope / (square + loss.second);
+        if (next > low && next < high) {
+            t = next;
+        } else if (std::isinf(high)) {
+            t = 4.0 * t;
+        } else {
+            t = trial % 2 == 0 ? 0.5 * (low + high) : low + 0.1 * (high - low);
+        }
+    }
+    return t;
+}
+
+/// Without a row on the edge of the tube the bias may lie anywhere between two of them; libsvm takes the
+/// middle.
+void TubeSolver::centre_undetermined_bias() {
+    find_bending_rows();
+    if (!bending_.empty()) return;
+    double lowest = -std::numeric_limits<double>::infinity();
+    double highest = std::numeric_limits<double>::infinity();
+    for (Index i = 0; i < residuals_.size(); ++i) {
+        const double to_upper_edge = residuals_(i) - epsilon_;
+        const double to_lower_edge = residuals_(i) + epsilon_;
+        if (slopes_(i) == 0.0) lowest = std::max(lowest, to_upper_edge);
+        if (slopes_(i) < 0.0) lowest = std::max(lowest, to_lower_edge);
+        if (slopes_(i) == 0.0) highest = std::min(highest, to_lower_edge);
+        if (slopes_(i) > 0.0) highest = std::min(highest, to_upper_edge);
+    }
+    if (!(std::isfinite(lowest) && std::isfinite(highest) && lowest < highest)) return;
+    const double move = 0.5 * (lowest + highest);
+    state_.bias += move;
+    residuals_.array() -= move;
+}
+
+bool TubeSolver::is_free_of_C() const {
+    return slopes_.lpNorm<Eigen::Infinity>() < tube_.C;
+}
+
+double TubeSolver::duality_gap() const {
+    const double loss = (residuals_.array().abs() - epsilon_).max(0.0).sum();
+    const double primal = 0.5 * state_.weights.squaredNorm() + tube_.C * loss;
+    // A dual point must sum to 0: what is left over is taken from the largest coefficients of that sign.
+    VectorXd feasible = slopes_;
+    double left_over = feasible.sum();
+    for (Index i = 0; i < feasible.size() && left_over != 0.0; ++i) {
+        if (feasible(i) * left_over <= 0.0) continue;
+        const double taken = std::copysign(std::min(std::abs(feasible(i)), std::abs(left_over)), left_over);
+        feasible(i) -= taken;
+        left_over -= taken;
+    }
+    const VectorXd weights = by_row_ * feasible;
+    const double dual =
+        targets_.dot(feasible) - epsilon_ * feasible.lpNorm<1>() - 0.5 * weights.squaredNorm();
+    return primal - dual;
+}
+
+}  // namespace thermbal

@@ -1,0 +1,152 @@
+#include "regression/vector_loops.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)
+#define THERMBAL_EVERY_WIDTH __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define THERMBAL_EVERY_WIDTH
+#endif
+
+namespace thermbal::vector_loops {
+namespace {
+
+constexpr std::size_t lanes = 8;
+using Lanes = std::array<double, lanes>;
+
+/// Always in the same order, whatever the processor.
+inline double total(const Lanes& sums) {
+    return ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
+}
+
+}  // namespace
+
+THERMBAL_EVERY_WIDTH
+void multiply_columns(const double* __restrict matrix, std::size_t rows, std::size_t columns,
+                      const double* __restrict factor, double constant, double* __restrict out) {
+    for (std::size_t i = 0; i < rows; ++i) out[i] = constant;
+    std::size_t k = 0;
+    for (; k + 4 <= columns; k += 4) {
+        const double* a = matrix + k * rows;
+        const double* b = a + rows;
+        const double* c = b + rows;
+        const double* d = c + rows;
+        for (std::size_t i = 0; i < rows; ++i) {
+            out[i] +=
+                (factor[k] * a[i] + factor[k + 1] * b[i]) + (factor[k + 2] * c[i] + factor[k + 3] * d[i]);
+        }
+    }
+    for (; k < columns; ++k) {
+        const double* a = matrix + k * rows;
+        for (std::size_t i = 0; i < rows; ++i) out[i] += factor[k] * a[i];
+    }
+}
+
+THERMBAL_EVERY_WIDTH
+void subtract_columns(const double* __restrict matrix, std::size_t rows, std::size_t columns,
+                      const double* __restrict factor, double* __restrict out) {
+    std::size_t k = 0;
+    for (; k + 4 <= columns; k += 4) {
+        const double* a = matrix + k * rows;
+        const double* b = a + rows;
+        const double* c = b + rows;
+        const double* d = c + rows;
+        for (std::size_t i = 0; i < rows; ++i) {
+            out[i] -=
+                (factor[k] * a[i] + factor[k + 1] * b[i]) + (factor[k + 2] * c[i] + factor[k + 3] * d[i]);
+        }
+    }
+    for (; k < columns; ++k) {
+        const double* a = matrix + k * rows;
+        for (std::size_t i = 0; i < rows; ++i) out[i] -= factor[k] * a[i];
+    }
+}
+
+THERMBAL_EVERY_WIDTH
+void squared_distances_to(const double* __restrict series, std::size_t rows, const double* __restrict point,
+                          std::size_t lags, double* __restrict distance) {
+    for (std::size_t i = 0; i < rows; ++i) distance[i] = 0.0;
+    for (std::size_t l = 0; l < lags; ++l) {
+        const double at = point[l];
+        const double* lagged = series + l;
+        for (std::size_t i = 0; i < rows; ++i) {
+            const double difference = lagged[i] - at;
+            distance[i] += difference * difference;
+        }
+    }
+}
+
+/// 2^k e^f with k = round(x / ln 2), |f| <= ln 2 / 2, e^f by its Taylor polynomial of degree 12.
+THERMBAL_EVERY_WIDTH
+void scaled_exp(double* __restrict values, std::size_t count, double factor) {
+    constexpr double log2_e = 1.4426950408889634;
+    constexpr double ln2_high = 6.93147180369123816490e-01;
+    constexpr double ln2_low = 1.90821492927058770002e-10;
+    constexpr double to_integer =
+        6755399441055744.0;  // 1.5 * 2^52: the sum's low bits are the rounded integer
+    for (std::size_t i = 0; i < count; ++i) {
+        const double x = factor * values[i];
+        const double shifted = x * log2_e + to_integer;
+        const double k = shifted - to_integer;
+        const double f = (x - k * ln2_high) - k * ln2_low;
+        double p = 1.0 / 479001600.0;
+        p = p * f + 1.0 / 39916800.0;
+        p = p * f + 1.0 / 3628800.0;
+        p = p * f + 1.0 / 362880.0;
+        p = p * f + 1.0 / 40320.0;
+        p = p * f + 1.0 / 5040.0;
+        p = p * f + 1.0 / 720.0;
+        p = p * f + 1.0 / 120.0;
+        p = p * f + 1.0 / 24.0;
+        p = p * f + 1.0 / 6.0;
+        p = p * f + 0.5;
+        p = p * f + 1.0;
+        p = p * f + 1.0;
+        const std::uint64_t exponent = (std::bit_cast<std::uint64_t>(shifted) + 1023) << 52;
+        values[i] = p * std::bit_cast<double>(exponent);
+    }
+}
+
+THERMBAL_EVERY_WIDTH
+void loss_slopes(const double* __restrict residual, std::size_t count, const Tube& tube,
+                 double* __restrict slope) {
+    const double C = tube.C;
+    const double epsilon = tube.epsilon;
+    const double inverse = 1.0 / tube.smoothing;
+    for (std::size_t i = 0; i < count; ++i) {
+        const double above = std::min(std::max((residual[i] - epsilon) * inverse, 0.0), 1.0);
+        const double below = std::min(std::max((-residual[i] - epsilon) * inverse, 0.0), 1.0);
+        slope[i] = C * (above - below);
+    }
+}
+
+THERMBAL_EVERY_WIDTH
+Derivatives derivatives_along(const double* __restrict residual, const double* __restrict change, double t,
+                              std::size_t count, const Tube& tube) {
+    const double epsilon = tube.epsilon;
+    const double inverse = 1.0 / tube.smoothing;
+    Lanes first{};
+    Lanes second{};
+    const auto add = [&](std::size_t i, std::size_t lane) __attribute__((always_inline)) {
+        const double moved = residual[i] - t * change[i];
+        const double above = (moved - epsilon) * inverse;
+        const double below = (-moved - epsilon) * inverse;
+        const double slope = std::min(std::max(above, 0.0), 1.0) - std::min(std::max(below, 0.0), 1.0);
+        const double over = std::max(above, below);
+        first[lane] += slope * change[i];
+        second[lane] += (over > 0.0 && over < 1.0) ? change[i] * change[i] : 0.0;
+    };
+    std::size_t i = 0;
+    for (; i + lanes <= count; i += lanes) {
+        for (std::size_t lane = 0; lane < lanes; ++lane) add(i + lane, lane);
+    }
+    for (std::size_t lane = 0; i < count; ++i, ++lane) add(i, lane);
+    return {tube.C * total(first), tube.C * inverse * total(second)};
+}
+
+}  // namespace thermbal::vector_loops
