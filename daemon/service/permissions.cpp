@@ -16,7 +16,7 @@ namespace {
 
 // Room for one entry of the user or group database; a group with more members than fit counts as unknown.
 using EntryBuffer = std::vector<char>;
-constexpr std::size_t entry_bytes = 256 * 1024;
+constexpr std::size_t entry_bytes = 256UL * 1024;
 
 std::optional<gid_t> group_id(const std::string& name) {
     if (name.empty()) return std::nullopt;

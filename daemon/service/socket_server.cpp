@@ -26,7 +26,7 @@ using nlohmann::json;
 namespace {
 
 // With more than this unread, a client's further requests wait until it has read.
-constexpr std::size_t enough_unread = 256 * 1024;
+constexpr std::size_t enough_unread = 256UL * 1024;
 constexpr std::size_t most_topics = 32;
 
 struct Client {

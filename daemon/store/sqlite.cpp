@@ -232,7 +232,8 @@ Transaction::Transaction(Database& database, Kind kind)
 
 Transaction::~Transaction() {
     // SQLite has rolled back by itself after some errors.
-    if (outermost_ && database_.in_transaction()) (void)database_.execute("ROLLBACK");
+    if (!outermost_ || !database_.in_transaction()) return;
+    [[maybe_unused]] const auto rolled_back = database_.execute("ROLLBACK");
 }
 
 Result<void> Transaction::commit() {

@@ -37,16 +37,14 @@ enum class Access : std::uint8_t { reads, changes };
 
 struct SocketServerOptions {
     std::filesystem::path path = "/run/thermbal/thermbald.sock";
-    mode_t mode = 0666;  ///< who can open it may read; what changes something is checked per request
-    std::string
-        operators_group;  ///< whose members may change something, besides root and the daemon's own user
+    mode_t mode = 0666;           ///< who can open it may read; what changes something is checked per request
+    std::string operators_group;  ///< whose members may change something, as root and the daemon's user may
     std::size_t max_clients = 64;
     std::size_t max_clients_per_user = 24;  ///< root and the daemon's own user are exempt
-    std::size_t max_request_bytes =
-        64 * 1024;  ///< one line; a longer one is answered with an error and closed
-    std::size_t max_reply_bytes = 8 * 1024 * 1024;
-    std::size_t max_pending_bytes = 64 * 1024 * 1024;  ///< unread replies of all clients together
-    std::size_t max_backlog_bytes = 1024 * 1024;  ///< unread notifications at which a subscriber is dropped
+    std::size_t max_request_bytes = 65536;  ///< one line; a longer one is answered with an error and closed
+    std::size_t max_reply_bytes = 8UL * 1024 * 1024;
+    std::size_t max_pending_bytes = 64UL * 1024 * 1024;  ///< unread replies of all clients together
+    std::size_t max_backlog_bytes = 1024UL * 1024;  ///< unread notifications at which a subscriber is dropped
 };
 
 /// JSON-RPC 2.0 over a Unix stream socket, one document a line. Requests may be pipelined; replies come in
