@@ -1,0 +1,68 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "base/error.hpp"
+
+namespace thermbal {
+
+/// The recursive alternative of Xia et al. 2014 (doi 10.1631/jzus.A1400074): an adaptive unscented Kalman
+/// filter.
+struct KalmanOptions {
+    double period_s = 15.0;
+    double initial_time_constant_min = 40.0;
+    double initial_log_time_constant_sd = 0.8;
+    double initial_rise_C = 5.0;
+    double initial_rise_sd_C = 8.0;
+    double measurement_sd_C = 0.06;         ///< start value; adapts
+    double equilibrium_walk_C = 0.002;      ///< process noise a step: lets slower modes in
+    double log_time_constant_walk = 0.003;  ///< the rate slows as fast modes die away
+    double forgetting = 0.99;  ///< of the adaptive noise estimate (Sage and Husa 1969), per sample
+
+    Result<void> check() const;
+};
+
+/// One channel. State: temperature, equilibrium temperature, logarithm of the time constant;
+///     T' = E + (T - E) exp(-dt / tau),   E' = E,   log tau' = log tau,   y = T + noise.
+/// O(1) memory and work a sample. `scaled sigma points` as Julier and Uhlmann with alpha 1, kappa 0. The
+/// measurement noise adapts to the innovations. Its interval is a single exponential's: see the README for
+/// how often it holds.
+class AdaptiveUnscentedKalman {
+  public:
+    explicit AdaptiveUnscentedKalman(const KalmanOptions& options) : options_(options) {}
+
+    /// One scan; NaN is a missing sample: the state is propagated and nothing is learnt.
+    void add(double temperature_C);
+
+    bool started() const { return started_; }
+    double temperature_C() const { return state_[0]; }
+    double steady_state_C() const { return state_[1]; }
+    double steady_state_sd_C() const;
+    double time_constant_min() const;
+    double measurement_sd_C() const;
+    /// Since the first sample: when 95 % of the way from it to the steady state is done; the past if it is
+    /// over.
+    double equilibrium_time_min() const;
+    std::size_t samples() const { return samples_; }
+
+  private:
+    static constexpr std::size_t size = 3;
+    using State = std::array<double, size>;
+    using Covariance = std::array<std::array<double, size>, size>;
+
+    void start(double temperature_C);
+    void predict();
+    void update(double temperature_C);
+
+    KalmanOptions options_;
+    bool started_ = false;
+    std::size_t scans_ = 0;
+    std::size_t samples_ = 0;
+    double first_C_ = 0.0;
+    double noise_variance_ = 0.0;
+    State state_{};
+    Covariance covariance_{};
+};
+
+}  // namespace thermbal
