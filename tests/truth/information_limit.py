@@ -20,15 +20,29 @@ def apart(p):
 def fit_modes(t_min, clean_C, sigma_C, most=4):
     """Shared time constants (min), coefficients [1 + K, channels] and worst rms misfit / noise. clean_C: rows are times."""
     best = None
-    starts = {1: [[50.0]], 2: [[60.0, 12.0]], 3: [[80.0, 25.0, 5.0]], 4: [[130.0, 45.0, 12.0, 3.0], [70.0, 30.0, 10.0, 4.0]]}
+    starts = {
+        1: [[50.0]],
+        2: [[60.0, 12.0]],
+        3: [[80.0, 25.0, 5.0]],
+        4: [[130.0, 45.0, 12.0, 3.0], [70.0, 30.0, 10.0, 4.0]],
+    }
     for order in range(1, most + 1):
+
         def misfit(p):
             X = _basis(t_min, apart(p))
             return ((clean_C - X @ np.linalg.lstsq(X, clean_C, rcond=None)[0]) / sigma_C).ravel()
-        lower = np.r_[np.log(2.0), np.full(order - 1, np.log(1.5))]  # coalescing modes would not be modes any more
+
+        lower = np.r_[
+            np.log(2.0), np.full(order - 1, np.log(1.5))
+        ]  # coalescing modes would not be modes any more
         tries = [np.r_[s[0], -np.diff(s)] for s in map(np.log, starts[order])]
-        found = min((least_squares(misfit, s, bounds=(lower, np.log(2000.0)), x_scale=0.3, max_nfev=60) for s in tries),
-                    key=lambda f: f.cost)
+        found = min(
+            (
+                least_squares(misfit, s, bounds=(lower, np.log(2000.0)), x_scale=0.3, max_nfev=60)
+                for s in tries
+            ),
+            key=lambda f: f.cost,
+        )
         log_tau = np.sort(apart(found.x))
         X = _basis(t_min, log_tau)
         coefficients = np.linalg.lstsq(X, clean_C, rcond=None)[0]
@@ -50,7 +64,7 @@ def steady_state_sd(tau_min, coefficients, sigma_C, windows_min, period_min=0.25
         E = np.exp(-t[:, None] / tau_min)
         D = E * (t[:, None] / tau_min)  # derivative with log tau, amplitude one
         R = np.linalg.qr(np.hstack([np.ones((len(t), 1)), E, D]), mode="r")
-        R11, R12, R22 = R[:K + 1, :K + 1], R[:K + 1, K + 1:], R[K + 1:, K + 1:]
+        R11, R12, R22 = R[: K + 1, : K + 1], R[: K + 1, K + 1 :], R[K + 1 :, K + 1 :]
         try:
             first = np.linalg.solve(R11.T, np.eye(K + 1)[0])  # e0' R11^-1
             stacked = np.vstack([R22 * coefficients[1:, c] / sigma_C[c] for c in range(channels)])

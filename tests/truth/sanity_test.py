@@ -2,6 +2,7 @@
 """The truth is checked before it judges anything: balances, analytic answers, another integrator, another bound."""
 import json
 import os
+
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import subprocess
 import sys
@@ -16,9 +17,13 @@ from scipy.optimize import curve_fit
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
-import make_corpus
+import recording
+from body import Design
+from conditions import Conditions, Regime, Room
+from drawing import draw_design
 from information_limit import fit_modes, steady_state_sd
-from machine import Body, Coolant, Design, Machine, PLACES, Regime, Room, draw_design, place_node, walther_viscosity, with_design
+from integration import simulate
+from machine import PLACES, Machine, place_node, walther_viscosity
 
 FAILURES = []
 
@@ -40,8 +45,11 @@ def energy_balance():
     surface, _ = machine.surface_flow(T, 21.0, machine.forced_h(regime.rpm))
     made = machine.heat(machine.means @ T, regime, np.inf).sum()
     cooled = (machine.cooling * (T - 20.0)).sum()
-    check("heat made = heat lost to air and coolant, W", abs(made + surface.sum() - cooled) < 1e-6 * made,
-          f"{made:.6f} made, {-surface.sum():.6f} + {cooled:.6f} lost")
+    check(
+        "heat made = heat lost to air and coolant, W",
+        abs(made + surface.sum() - cooled) < 1e-6 * made,
+        f"{made:.6f} made, {-surface.sum():.6f} + {cooled:.6f} lost",
+    )
     inner = np.abs(machine.conduction.sum(0)).max()
     check("conduction makes no heat, W/K", inner < 1e-9, f"{inner:.1e}")
     check("the balance is not empty, W", made > 50 and cooled > 5, f"{made:.0f}")
@@ -49,8 +57,15 @@ def energy_balance():
 
 def regions(machine):
     h, n = machine.head, len(machine.sleeve)
-    return [machine.sleeve[n // 16:3 * n // 16], machine.sleeve[12 * n // 16:14 * n // 16], h[:, :, :h.shape[2] // 2].ravel(),
-            h[:, :, h.shape[2] // 2:].ravel(), h[:, -(h.shape[1] // 4):, :].ravel(), machine.column.ravel(), [machine.nose]]
+    return [
+        machine.sleeve[n // 16 : 3 * n // 16],
+        machine.sleeve[12 * n // 16 : 14 * n // 16],
+        h[:, :, : h.shape[2] // 2].ravel(),
+        h[:, :, h.shape[2] // 2 :].ravel(),
+        h[:, -(h.shape[1] // 4) :, :].ravel(),
+        machine.column.ravel(),
+        [machine.nose],
+    ]
 
 
 def grid_refinement():
@@ -60,8 +75,11 @@ def grid_refinement():
         T = machine.steady(20.0, regime)
         rises.append(np.array([T[list(nodes)].mean() - 20.0 for nodes in regions(machine)]))
     worst = np.abs(rises[1] - rises[0]).max() / rises[1].max()
-    check("eight times the volumes move no region's mean steady rise by more than 7 % of the largest", worst < 0.07,
-          f"{100 * worst:.2f} %, rises {np.round(rises[0], 2)} and {np.round(rises[1], 2)}")
+    check(
+        "eight times the volumes move no region's mean steady rise by more than 7 % of the largest",
+        worst < 0.07,
+        f"{100 * worst:.2f} %, rises {np.round(rises[0], 2)} and {np.round(rises[1], 2)}",
+    )
 
 
 class OneVolume(Machine):
@@ -87,14 +105,19 @@ def single_volume():
     tau = 40e3 / G
     observe = np.array([[1.0, 0.0]])
     room = Room(level_C=20.0, ramp_C_per_h=1.5)
-    found = machine.simulate(np.full(2, 20.0), [regime], room, Coolant(), 0.0, 24000.0, times, observe)[:, 0]
+    found, _ = simulate(machine, np.full(2, 20.0), Conditions([regime], room), (0.0, 24000.0), times, observe)
+    found = found[:, 0]
     rate, grown = 1.5 / 3600.0, 1.0 - np.exp(-times / tau)
     exact = 20.0 + rate * times - rate * tau * grown + 100.0 / G * grown
     worst = np.abs(found - exact).max()
     check("one volume in a room that ramps, against the analytic solution, C", worst < 2e-3, f"{worst:.1e}")
-    stopped = machine.simulate(np.full(2, 20.0), [regime, Regime(3607.5, 0.0)], Room(20.0), Coolant(), 0.0, 24000.0, times, observe)[:, 0]
+    stopping = Conditions([regime, Regime(3607.5, 0.0)], Room(20.0))
+    stopped, _ = simulate(machine, np.full(2, 20.0), stopping, (0.0, 24000.0), times, observe)
+    stopped = stopped[:, 0]
     peak, slow = 100.0 / G * (1 - np.exp(-3607.5 / tau)), 40e3 / 5.0
-    exact = 20.0 + np.where(times < 3607.5, 100.0 / G * grown, peak * np.exp(-np.maximum(times - 3607.5, 0.0) / slow))
+    exact = 20.0 + np.where(
+        times < 3607.5, 100.0 / G * grown, peak * np.exp(-np.maximum(times - 3607.5, 0.0) / slow)
+    )
     worst = np.abs(stopped - exact).max()
     check("the same, stopped between two samples, C", worst < 2e-3, f"{worst:.1e}")
 
@@ -103,10 +126,15 @@ def linear_machine_against_expm():
     machine = Machine(replace(draw_design(np.random.default_rng(3), "linear"), friction_scale=0.1))
     regime = Regime(0.0, 4000.0)
     steady = machine.steady(20.0, regime)
-    A = machine.jacobian(steady, 20.0, regime, machine.forced_h(regime.rpm), np.inf) / machine.capacity[:, None]
+    A = (
+        machine.jacobian(steady, 20.0, regime, machine.forced_h(regime.rpm), np.inf)
+        / machine.capacity[:, None]
+    )
     step = expm(A * 1200.0)
     times = np.arange(0.0, 24001.0, 1200.0)
-    found = machine.simulate(np.full_like(steady, 20.0), [regime], Room(20.0), Coolant(), 0.0, 24000.0, times, np.eye(len(steady)))
+    cold = np.full_like(steady, 20.0)
+    conditions = Conditions([regime], Room(20.0))
+    found, _ = simulate(machine, cold, conditions, (0.0, 24000.0), times, np.eye(len(steady)))
     exact, x = [], 20.0 - steady
     for _ in times:
         exact.append(steady + x)
@@ -124,44 +152,64 @@ def nonlinear_machine_against_bdf():
     observe[range(16), nodes] = 1.0
     times = np.arange(0.0, 6001.0, 60.0)
     start = np.full(len(machine.capacity), 20.0)
-    found = machine.simulate(start, regimes, room, Coolant(), 0.0, 6000.0, times, observe)
+    found, _ = simulate(machine, start, Conditions(regimes, room), (0.0, 6000.0), times, observe)
     exact, T = [], start
     for regime, (begin, end) in zip(regimes, ((0.0, 3007.5), (3007.5, 6000.0))):
         forced = machine.forced_h(regime.rpm)
-        solution = solve_ivp(lambda t, x: machine.flow(x, float(room(t)), 20.0, regime, forced, t) / machine.capacity, (begin, end), T,
-                             method="BDF", rtol=1e-5, atol=1e-4, max_step=120.0, t_eval=[t for t in times if begin <= t < end] + [end],
-                             jac=lambda t, x: machine.jacobian(x, float(room(t)), regime, forced, t) / machine.capacity[:, None])
+        solution = solve_ivp(
+            lambda t, x: machine.flow(x, float(room(t)), 20.0, regime, forced, t) / machine.capacity,
+            (begin, end),
+            T,
+            method="BDF",
+            rtol=1e-5,
+            atol=1e-4,
+            max_step=120.0,
+            t_eval=[t for t in times if begin <= t < end] + [end],
+            jac=lambda t, x: machine.jacobian(x, float(room(t)), regime, forced, t)
+            / machine.capacity[:, None],
+        )
         T = solution.y[:, -1]
         exact.append(solution.y[nodes].T[:-1])
     worst = np.abs(found[:-1] - np.vstack(exact)).max()
-    check("nonlinear friction, run-in, HVAC and a speed step against scipy's BDF, C", worst < 0.02, f"{worst:.1e}")
+    check(
+        "nonlinear friction, run-in, HVAC and a speed step against scipy's BDF, C",
+        worst < 0.02,
+        f"{worst:.1e}",
+    )
 
 
 def settles_where_it_says():
     machine, regime = drawn(5), Regime(0.0, 5000.0, 0.2)
     steady = machine.steady(22.0, regime)
-    times = np.array([0.0, 600000.0])
-    machine.simulate(np.full_like(steady, 18.0), [regime], Room(22.0), Coolant(), 0.0, 600000.0, times, np.eye(len(steady))[:1])
-    worst = np.abs(machine.final - steady).max()
+    conditions = Conditions([regime], Room(22.0))
+    nothing = np.eye(len(steady))[:1]
+    _, final = simulate(
+        machine, np.full_like(steady, 18.0), conditions, (0.0, 600000.0), np.array([]), nothing
+    )
+    worst = np.abs(final - steady).max()
     check("after 10 000 min every volume is where the steady solution says, C", worst < 1e-3, f"{worst:.1e}")
     moved = np.abs(steady - 18.0).max()
     check("and it had gone a long way, C", moved > 5.0, f"{moved:.1f}")
 
 
 def sensors():
-    t = make_corpus.TIMES
+    t = recording.TIMES
     ramp = 20.0 + 0.002 * t
-    found = make_corpus.lagged(ramp, 45.0)
+    found = recording.lagged(ramp, 45.0)
     exact = ramp - 0.002 * 45.0 * (1.0 - np.exp(-t / 45.0))
     worst = np.abs(found - exact).max()
     check("sensor lag on a ramp against the analytic answer, C", worst < 1e-9, f"{worst:.1e}")
     rng = np.random.default_rng(6)
-    sensor = make_corpus.draw_sensors(rng, 0.05, 0.1)
-    readings = make_corpus.measured(rng, np.full((4000, 16), 21.237), sensor)
+    sensor = recording.draw_sensors(rng, 0.05, 0.1)
+    readings = recording.measured(rng, np.full((4000, 16), 21.237), sensor)
     on_grid = np.abs(readings * 10 - np.round(readings * 10)).max()
     check("readings lie on the module's grid of 0.1 C", on_grid < 1e-9, f"{on_grid:.1e}")
     sd = (readings - 21.237).std()
-    check("their scatter is noise and rounding together, C", abs(sd / make_corpus.total_sigma(sensor) - 1) < 0.03, f"{sd:.4f}")
+    check(
+        "their scatter is noise and rounding together, C",
+        abs(sd / recording.total_sigma(sensor) - 1) < 0.03,
+        f"{sd:.4f}",
+    )
 
 
 def viscosity():
@@ -182,11 +230,15 @@ def information_limit():
     rows = []
     for c in range(2):
         own = np.zeros((len(t), 6))
-        own[:, 3 * c:3 * c + 3] = np.hstack([np.ones((len(t), 1)), E])
+        own[:, 3 * c : 3 * c + 3] = np.hstack([np.ones((len(t), 1)), E])
         rows.append(np.hstack([own, E * t[:, None] / tau * coefficients[1:, c]]) / sigma[c])
     _, s, v = np.linalg.svd(np.vstack(rows), full_matrices=False)
     brute = np.sqrt(((v[:, [0, 3]] / s[:, None]) ** 2).sum(0))
-    check("the Cramer-Rao bound, eliminated against whole", np.allclose(found, brute, rtol=1e-6), f"{found} against {brute}")
+    check(
+        "the Cramer-Rao bound, eliminated against whole",
+        np.allclose(found, brute, rtol=1e-6),
+        f"{found} against {brute}",
+    )
     rng, estimates = np.random.default_rng(7), []
     model = lambda t, s, a, k: s + a * np.exp(-t / k)
     for _ in range(300):
@@ -198,28 +250,71 @@ def information_limit():
     t = np.arange(0.0, 400.0, 2.0)
     clean = np.hstack([np.ones((len(t), 1)), np.exp(-t[:, None] / tau)]) @ coefficients
     fitted = fit_modes(t, clean, 0.05)
-    check("the fit of few modes finds them again, min", len(fitted[0]) == 2 and np.allclose(fitted[0], tau, rtol=1e-2), f"{fitted[0]}")
+    check(
+        "the fit of few modes finds them again, min",
+        len(fitted[0]) == 2 and np.allclose(fitted[0], tau, rtol=1e-2),
+        f"{fitted[0]}",
+    )
 
 
 def files():
     with tempfile.TemporaryDirectory() as folder:
         for name in ("a", "b"):
-            subprocess.run([sys.executable, str(HERE / "make_corpus.py"), "--out", f"{folder}/{name}", "--runs", "2", "--seed", "8",
-                            "--group", "modes_2", "--group", "speed_step"], check=True)
-        same = all((Path(folder) / "a" / f).read_bytes() == (Path(folder) / "b" / f).read_bytes() for f in ("001.csv", "001.truth.json", "002.csv"))
+            subprocess.run(
+                [
+                    sys.executable,
+                    str(HERE / "make_corpus.py"),
+                    "--out",
+                    f"{folder}/{name}",
+                    "--runs",
+                    "2",
+                    "--seed",
+                    "8",
+                    "--group",
+                    "modes_2",
+                    "--group",
+                    "speed_step",
+                ],
+                check=True,
+            )
+        same = all(
+            (Path(folder) / "a" / f).read_bytes() == (Path(folder) / "b" / f).read_bytes()
+            for f in ("001.csv", "001.truth.json", "002.csv")
+        )
         check("the same seed makes the same files, byte for byte", same, same)
         for path in sorted((Path(folder) / "a").glob("*.truth.json")):
             truth = json.loads(path.read_text())
             data = np.genfromtxt(path.with_name(truth["file"]), delimiter=",", names=True)
             increasing = (np.diff(data["time_s"]) > 0).all()
-            check(f"{truth['group']}: times strictly increase, 16 channels", increasing and "T16" in data.dtype.names, len(data))
-            late = [abs(np.nanmean(data[n][-40:]) - c["settle_at_end_C"]) - c["left_at_end_C"] for n, c in truth["channels"].items()]
+            check(
+                f"{truth['group']}: times strictly increase, 16 channels",
+                increasing and "T16" in data.dtype.names,
+                len(data),
+            )
+            late = [
+                abs(np.nanmean(data[n][-40:]) - c["settle_at_end_C"]) - c["left_at_end_C"]
+                for n, c in truth["channels"].items()
+            ]
             worst = max(late)
-            check(f"{truth['group']}: the last readings are as far from the truth as it says, C", worst < 0.12, f"{worst:.3f}")
+            check(
+                f"{truth['group']}: the last readings are as far from the truth as it says, C",
+                worst < 0.12,
+                f"{worst:.3f}",
+            )
 
 
-for part in (energy_balance, grid_refinement, single_volume, linear_machine_against_expm, nonlinear_machine_against_bdf,
-             settles_where_it_says, sensors, viscosity, information_limit, files):
+for part in (
+    energy_balance,
+    grid_refinement,
+    single_volume,
+    linear_machine_against_expm,
+    nonlinear_machine_against_bdf,
+    settles_where_it_says,
+    sensors,
+    viscosity,
+    information_limit,
+    files,
+):
     part()
 if FAILURES:
     print(f"{len(FAILURES)} failed: " + "; ".join(FAILURES))

@@ -52,14 +52,24 @@ def main():
                 continue
             steady, sd, tau, amplitude = best_exponential(t[use][::4], y[use][::4])
             inside = inside + 1 if 1.645 * sd <= args.tolerance_C else 0
-            answer = {"channel": name, "declared": inside >= 3, "steady_state_C": steady, "steady_state_low_C": steady - 1.645 * sd,
-                      "steady_state_high_C": steady + 1.645 * sd, "equilibrium_time_min": 3.0 * tau,
-                      "reason": "declared" if inside >= 3 else "the interval is too wide"}
+            answer = {
+                "channel": name,
+                "declared": inside >= 3,
+                "steady_state_C": steady,
+                "steady_state_low_C": steady - 1.645 * sd,
+                "steady_state_high_C": steady + 1.645 * sd,
+                "equilibrium_time_min": 3.0 * tau,
+                "reason": "declared" if inside >= 3 else "the interval is too wide",
+            }
             if inside >= 3:
                 answer["declared_at_min"] = window
                 break
         channels.append(answer or {"channel": name, "declared": False, "reason": "no samples"})
-        stop = None if stop is None or not channels[-1]["declared"] else max(stop, channels[-1]["declared_at_min"])
+        stop = (
+            None
+            if stop is None or not channels[-1]["declared"]
+            else max(stop, channels[-1]["declared_at_min"])
+        )
     json.dump({"test_stopped_at_min": stop, "channels": channels}, sys.stdout)
 
 

@@ -29,12 +29,22 @@ AFTER_CHANGE_MIN = 10.0
 
 # -- running --------------------------------------------------------------------------------------------------------
 
+
 def replay(csv, args):
     """The replay's JSON, or {"failure": why}. It sees a copy of the CSV alone, never the truth beside it."""
     with tempfile.TemporaryDirectory() as alone:
         copy = shutil.copy(csv, Path(alone) / "test.csv")
-        command = [*shlex.split(args.thermbalctl), "replay", str(copy), "--tolerance-C", str(args.tolerance_C),
-                   "--every-min", str(args.every_min), "--json", *args.replay_arg]
+        command = [
+            *shlex.split(args.thermbalctl),
+            "replay",
+            str(copy),
+            "--tolerance-C",
+            str(args.tolerance_C),
+            "--every-min",
+            str(args.every_min),
+            "--json",
+            *args.replay_arg,
+        ]
         began = time.monotonic()
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=args.timeout_s)
@@ -66,7 +76,11 @@ def answers_of(runs, args):
             (args.save_replays / f"{run[0].stem}.replay.json").write_text(json.dumps(answer))
         done[0] += 1
         if args.progress:
-            print(f"{done[0]}/{len(runs)} {run[0].name} {answer.get('failure', '')}", file=sys.stderr, flush=True)
+            print(
+                f"{done[0]}/{len(runs)} {run[0].name} {answer.get('failure', '')}",
+                file=sys.stderr,
+                flush=True,
+            )
         return answer
 
     with ThreadPoolExecutor(args.jobs) as pool:
@@ -75,6 +89,7 @@ def answers_of(runs, args):
 
 # -- judging one channel --------------------------------------------------------------------------------------------
 
+
 def number(value):
     return float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
 
@@ -82,8 +97,16 @@ def number(value):
 def judge(truth, name, said, stopped_at):
     """One channel's row: what was said against what is true."""
     c = truth.channels[name]
-    row = {"file": truth.file, "group": truth.group, "channel": name, "state": c["state"], "declarable": c["declarable"],
-           "declared": bool(said and said.get("declared")), "rise_C": c["rise_C"], "reason": (said or {}).get("reason")}
+    row = {
+        "file": truth.file,
+        "group": truth.group,
+        "channel": name,
+        "state": c["state"],
+        "declarable": c["declarable"],
+        "declared": bool(said and said.get("declared")),
+        "rise_C": c["rise_C"],
+        "reason": (said or {}).get("reason"),
+    }
     end = stopped_at if stopped_at is not None else WHOLE_TEST_MIN
     at = number(said.get("declared_at_min")) if row["declared"] else end
     row["complaint"] = complaint(row["declared"], said, at)
@@ -91,7 +114,9 @@ def judge(truth, name, said, stopped_at):
         at = WHOLE_TEST_MIN
     settle = truth.settle_C(name, at)
     row |= {"at_min": at, "settle_C": settle, "tolerance_C": truth.tolerance_C(name, at)}
-    steady, low, high = (number((said or {}).get(k)) for k in ("steady_state_C", "steady_state_low_C", "steady_state_high_C"))
+    steady, low, high = (
+        number((said or {}).get(k)) for k in ("steady_state_C", "steady_state_low_C", "steady_state_high_C")
+    )
     row["error_C"] = None if steady is None else steady - settle
     row["half_width_C"] = None if low is None or high is None else 0.5 * (high - low)
     row["held"] = None if low is None or high is None else low <= settle <= high
@@ -112,7 +137,9 @@ def complaint(declared, said, at):
     """What is inconsistent in an answer, whatever the truth."""
     if said is None:
         return "the channel is missing in the answer"
-    steady, low, high = (number(said.get(k)) for k in ("steady_state_C", "steady_state_low_C", "steady_state_high_C"))
+    steady, low, high = (
+        number(said.get(k)) for k in ("steady_state_C", "steady_state_low_C", "steady_state_high_C")
+    )
     if declared and at is None:
         return "declared, without declared_at_min"
     if declared and None in (steady, low, high):
@@ -140,11 +167,19 @@ def judge_run(truth, answer):
     said = {c.get("channel"): c for c in answer.get("channels", []) if isinstance(c, dict)}
     stopped_at = number(answer.get("test_stopped_at_min"))
     rows = [judge(truth, name, said.get(name), stopped_at) for name in truth.channels]
-    return {"file": truth.file, "group": truth.group, "failure": answer.get("failure"), "stopped_at_min": stopped_at,
-            "condition": truth.raw.get("condition"), "took_s": answer.get("took_s"), "rows": rows}
+    return {
+        "file": truth.file,
+        "group": truth.group,
+        "failure": answer.get("failure"),
+        "stopped_at_min": stopped_at,
+        "condition": truth.raw.get("condition"),
+        "took_s": answer.get("took_s"),
+        "rows": rows,
+    }
 
 
 # -- figures --------------------------------------------------------------------------------------------------------
+
 
 def share(hits, of):
     low, high = wilson(hits, of)
@@ -162,29 +197,48 @@ def figures(runs):
     declarable = [r for r in rows if r["declarable"]]
     right = [r for r in declarable if r["declared"] and not r["wrong"] and r["at_min"] < WHOLE_TEST_MIN]
     ratios = [r["ratio"] for r in right if r["ratio"]]
-    never = [r["ratio"] if r["declared"] and not r["wrong"] and r["ratio"] else math.inf for r in declarable if r["limit_min"]]
+    never = [
+        r["ratio"] if r["declared"] and not r["wrong"] and r["ratio"] else math.inf
+        for r in declarable
+        if r["limit_min"]
+    ]
     middle = sorted(never)[len(never) // 2] if never else math.inf
-    open_rows = [r for r in rows if not r["declared"] and r["held"] is not None and r["state"] in ("live", "barely_warming")]
+    open_rows = [
+        r
+        for r in rows
+        if not r["declared"] and r["held"] is not None and r["state"] in ("live", "barely_warming")
+    ]
     eq = [abs(r["equilibrium_error"]) for r in declared if r.get("equilibrium_error") is not None]
-    stops = [(run["stopped_at_min"] if run["stopped_at_min"] is not None else WHOLE_TEST_MIN) / WHOLE_TEST_MIN for run in runs]
+    stops = [
+        (run["stopped_at_min"] if run["stopped_at_min"] is not None else WHOLE_TEST_MIN) / WHOLE_TEST_MIN
+        for run in runs
+    ]
     return {
-        "runs": len(runs), "channels": len(rows), "declarable": len(declarable), "declared": len(declared),
+        "runs": len(runs),
+        "channels": len(rows),
+        "declarable": len(declarable),
+        "declared": len(declared),
         "wrong": share(sum(r["wrong"] for r in declared), len(declared)),
         "held": share(sum(r["held"] is True for r in declared), len(declared)),
         "held_undeclared": share(sum(r["held"] for r in open_rows), len(open_rows)),
         "half_width_C": quantile([r["half_width_C"] for r in declared if r["half_width_C"] is not None], 0.5),
-        "ratio_median": quantile(ratios, 0.5), "ratio_p90": quantile(ratios, 0.9),
+        "ratio_median": quantile(ratios, 0.5),
+        "ratio_p90": quantile(ratios, 0.9),
         "ratio_median_undeclared_never": middle if math.isfinite(middle) else None,
         "rightly_declared": share(len(right), len(declarable)),
         "stop_share_mean": float(np.mean(stops)) if stops else None,
         "stopped": share(sum(run["stopped_at_min"] is not None for run in runs), len(runs)),
         "rms_error_C": float(np.sqrt(np.mean(np.square(errors)))) if errors else None,
         "bias_C": float(np.mean(errors)) if errors else None,
-        "equilibrium_error_median": quantile(eq, 0.5), "equilibrium_error_p90": quantile(eq, 0.9),
-        "after_change": sum(r["after_change"] for r in declared), "left_standing": sum(r["left_standing"] for r in declared),
+        "equilibrium_error_median": quantile(eq, 0.5),
+        "equilibrium_error_p90": quantile(eq, 0.9),
+        "after_change": sum(r["after_change"] for r in declared),
+        "left_standing": sum(r["left_standing"] for r in declared),
         "faulty_declared": sum(r["declared"] and r["state"] in ("stuck", "dead") for r in rows),
-        "failures": sum(run["failure"] is not None for run in runs), "complaints": sum(r["complaint"] is not None for r in rows),
-        "took_s_mean": quantile([run["took_s"] for run in runs if run["took_s"]], 0.5)}
+        "failures": sum(run["failure"] is not None for run in runs),
+        "complaints": sum(r["complaint"] is not None for r in rows),
+        "took_s_mean": quantile([run["took_s"] for run in runs if run["took_s"]], 0.5),
+    }
 
 
 def paper_rows(runs):
@@ -198,8 +252,13 @@ def paper_rows(runs):
 
 # -- what a person reads --------------------------------------------------------------------------------------------
 
+
 def text(value, form="{:.3f}"):
-    return "-" if value is None or (isinstance(value, float) and not math.isfinite(value)) else form.format(value)
+    return (
+        "-"
+        if value is None or (isinstance(value, float) and not math.isfinite(value))
+        else form.format(value)
+    )
 
 
 def verdict(value, must, aim, below=True):
@@ -218,26 +277,72 @@ def held_verdict(value, must, aim):
 def table(total, groups, paper, args):
     wrong, held = total["wrong"]["share"], total["held"]["share"]
     held_groups = {g: f["held"] for g, f in groups.items() if f["held"]["of"]}
-    worst = min(held_groups.items(), key=lambda kv: kv[1]["share"], default=(None, {"share": None, "hits": 0, "of": 0}))
+    worst = min(
+        held_groups.items(),
+        key=lambda kv: kv[1]["share"],
+        default=(None, {"share": None, "hits": 0, "of": 0}),
+    )
     changes = total["after_change"] + total["left_standing"]
     lines = [
-        ("declared, error over max(0.3 C, 5 %)", f"{text(None if wrong is None else 100 * wrong, '{:.2f}')} % "
-         f"({total['wrong']['hits']} of {total['wrong']['of']})", "< 1 %", "0",
-         "no figure" if wrong is None else "aim" if wrong == 0 else "must" if wrong < 0.01 else "MISSED"),
-        ("90 % intervals hold the truth, all", f"{text(held)} [{text(total['held']['low'])}, {text(total['held']['high'])}]",
-         "0.85-0.97", "0.88-0.95", held_verdict(held, (0.85, 0.97), (0.88, 0.95))),
-        ("  ... worst group", f"{text(worst[1]['share'])} ({worst[0]}, {worst[1]['hits']} of {worst[1]['of']})", ">= 0.80", ">= 0.85",
-         verdict(worst[1]["share"], 0.80, 0.85, below=False)),
-        ("declared at / information limit, median", f"{text(total['ratio_median'])} (p90 {text(total['ratio_p90'])}, undeclared as never "
-         f"{text(total['ratio_median_undeclared_never'])})", "<= 1.2", "<= 0.9", verdict(total["ratio_median"], 1.2, 0.9)),
-        ("declarable channels declared rightly", f"{text(total['rightly_declared']['share'])} ({total['rightly_declared']['hits']} of "
-         f"{total['rightly_declared']['of']})", ">= 0.95", ">= 0.98", verdict(total["rightly_declared"]["share"], 0.95, 0.98, below=False)),
-        ("test stopped at, share of 400 min, mean", text(total["stop_share_mean"]), "<= 0.45", "<= 0.35",
-         verdict(total["stop_share_mean"], 0.45, 0.35)),
-        ("RMS error of declared", f"{text(total['rms_error_C'])} C (bias {text(total['bias_C'], '{:+.3f}')})", "<= 0.15", "<= 0.08",
-         verdict(total["rms_error_C"], 0.15, 0.08)),
-        ("within 10 min after a change / left standing", f"{total['after_change']} / {total['left_standing']}", "0", "0",
-         "aim" if changes == 0 else "MISSED"),
+        (
+            "declared, error over max(0.3 C, 5 %)",
+            f"{text(None if wrong is None else 100 * wrong, '{:.2f}')} % "
+            f"({total['wrong']['hits']} of {total['wrong']['of']})",
+            "< 1 %",
+            "0",
+            "no figure" if wrong is None else "aim" if wrong == 0 else "must" if wrong < 0.01 else "MISSED",
+        ),
+        (
+            "90 % intervals hold the truth, all",
+            f"{text(held)} [{text(total['held']['low'])}, {text(total['held']['high'])}]",
+            "0.85-0.97",
+            "0.88-0.95",
+            held_verdict(held, (0.85, 0.97), (0.88, 0.95)),
+        ),
+        (
+            "  ... worst group",
+            f"{text(worst[1]['share'])} ({worst[0]}, {worst[1]['hits']} of {worst[1]['of']})",
+            ">= 0.80",
+            ">= 0.85",
+            verdict(worst[1]["share"], 0.80, 0.85, below=False),
+        ),
+        (
+            "declared at / information limit, median",
+            f"{text(total['ratio_median'])} (p90 {text(total['ratio_p90'])}, undeclared as never "
+            f"{text(total['ratio_median_undeclared_never'])})",
+            "<= 1.2",
+            "<= 0.9",
+            verdict(total["ratio_median"], 1.2, 0.9),
+        ),
+        (
+            "declarable channels declared rightly",
+            f"{text(total['rightly_declared']['share'])} ({total['rightly_declared']['hits']} of "
+            f"{total['rightly_declared']['of']})",
+            ">= 0.95",
+            ">= 0.98",
+            verdict(total["rightly_declared"]["share"], 0.95, 0.98, below=False),
+        ),
+        (
+            "test stopped at, share of 400 min, mean",
+            text(total["stop_share_mean"]),
+            "<= 0.45",
+            "<= 0.35",
+            verdict(total["stop_share_mean"], 0.45, 0.35),
+        ),
+        (
+            "RMS error of declared",
+            f"{text(total['rms_error_C'])} C (bias {text(total['bias_C'], '{:+.3f}')})",
+            "<= 0.15",
+            "<= 0.08",
+            verdict(total["rms_error_C"], 0.15, 0.08),
+        ),
+        (
+            "within 10 min after a change / left standing",
+            f"{total['after_change']} / {total['left_standing']}",
+            "0",
+            "0",
+            "aim" if changes == 0 else "MISSED",
+        ),
     ]
     for row in paper:
         error, eq = row["error_C"], row.get("equilibrium_error")
@@ -245,28 +350,47 @@ def table(total, groups, paper, args):
             figure, grade = f"not declared: {row['reason']}", "MISSED"
         else:
             figure = f"at {row['at_min']:.1f} min, {text(error, '{:+.3f}')} C, 95 % time {text(eq and 100 * eq, '{:+.1f}')} %"
-            ok = lambda t, e, q: row["at_min"] <= t and error is not None and abs(error) <= e and eq is not None and abs(eq) <= q
+            ok = (
+                lambda t, e, q: row["at_min"] <= t
+                and error is not None
+                and abs(error) <= e
+                and eq is not None
+                and abs(eq) <= q
+            )
             grade = "aim" if ok(75, 0.1, 0.04) else "must" if ok(110, 0.15, 0.05) else "MISSED"
-        lines.append((f"T5, {row['condition']} ({row['file']})", figure, "110, 0.15, 5 %", "75, 0.1, 4 %", grade))
+        lines.append(
+            (f"T5, {row['condition']} ({row['file']})", figure, "110, 0.15, 5 %", "75, 0.1, 4 %", grade)
+        )
     widths = [max(len(line[i]) for line in lines) for i in range(5)]
-    out = [f"{total['runs']} runs, {total['channels']} channels, {total['declarable']} declarable, {total['declared']} declared"
-           + (f", {total['failures']} RUNS FAILED" if total["failures"] else "")
-           + (f", {total['complaints']} inconsistent answers" if total["complaints"] else ""), ""]
+    out = [
+        f"{total['runs']} runs, {total['channels']} channels, {total['declarable']} declarable, {total['declared']} declared"
+        + (f", {total['failures']} RUNS FAILED" if total["failures"] else "")
+        + (f", {total['complaints']} inconsistent answers" if total["complaints"] else ""),
+        "",
+    ]
     heads = ("figure", "here", "must", "aim", "reached")
     widths = [max(w, len(h)) for w, h in zip(widths, heads)]
     for line in (heads, *lines):
         out.append("  ".join(cell.ljust(w) for cell, w in zip(line, widths)).rstrip())
-    out += ["", f"also: undeclared channels' latest intervals hold {text(total['held_undeclared']['share'])} of {total['held_undeclared']['of']}; "
-            f"half width at the declaration, median {text(total['half_width_C'])} C; 95 % time error median "
-            f"{text(total['equilibrium_error_median'])}, p90 {text(total['equilibrium_error_p90'])}; stuck or dead channels declared "
-            f"{total['faulty_declared']}; one replay {text(total['took_s_mean'], '{:.1f}')} s", ""]
-    out.append(f"{'group':20}{'runs':>5}{'decl-able':>10}{'declared':>9}{'wrong':>6}{'held':>7}{'und.held':>9}{'ratio':>7}{'rightly':>8}"
-               f"{'stop':>6}{'rms C':>7}{'changes':>8}")
+    out += [
+        "",
+        f"also: undeclared channels' latest intervals hold {text(total['held_undeclared']['share'])} of {total['held_undeclared']['of']}; "
+        f"half width at the declaration, median {text(total['half_width_C'])} C; 95 % time error median "
+        f"{text(total['equilibrium_error_median'])}, p90 {text(total['equilibrium_error_p90'])}; stuck or dead channels declared "
+        f"{total['faulty_declared']}; one replay {text(total['took_s_mean'], '{:.1f}')} s",
+        "",
+    ]
+    out.append(
+        f"{'group':20}{'runs':>5}{'decl-able':>10}{'declared':>9}{'wrong':>6}{'held':>7}{'und.held':>9}{'ratio':>7}{'rightly':>8}"
+        f"{'stop':>6}{'rms C':>7}{'changes':>8}"
+    )
     for group, f in sorted(groups.items()):
-        out.append(f"{group:20}{f['runs']:5}{f['declarable']:10}{f['declared']:9}{f['wrong']['hits']:6}{text(f['held']['share'], '{:.2f}'):>7}"
-                   f"{text(f['held_undeclared']['share'], '{:.2f}'):>9}{text(f['ratio_median'], '{:.2f}'):>7}"
-                   f"{text(f['rightly_declared']['share'], '{:.2f}'):>8}{text(f['stop_share_mean'], '{:.2f}'):>6}{text(f['rms_error_C']):>7}"
-                   f"{f['after_change'] + f['left_standing']:8}")
+        out.append(
+            f"{group:20}{f['runs']:5}{f['declarable']:10}{f['declared']:9}{f['wrong']['hits']:6}{text(f['held']['share'], '{:.2f}'):>7}"
+            f"{text(f['held_undeclared']['share'], '{:.2f}'):>9}{text(f['ratio_median'], '{:.2f}'):>7}"
+            f"{text(f['rightly_declared']['share'], '{:.2f}'):>8}{text(f['stop_share_mean'], '{:.2f}'):>6}{text(f['rms_error_C']):>7}"
+            f"{f['after_change'] + f['left_standing']:8}"
+        )
     return out
 
 
@@ -275,10 +399,13 @@ def worst_cases(runs, count):
     rows.sort(key=lambda r: -abs(r["error_C"]) / r["tolerance_C"])
     out = [f"worst declarations (of {len(rows)}):"]
     for r in rows[:count]:
-        out.append(f"  {r['file']} {r['channel']:4}{r['group']:20} at {r['at_min']:6.1f} min (limit {text(r['limit_min'], '{:.0f}')}) "
-                   f"error {r['error_C']:+.3f} C of {r['tolerance_C']:.2f} allowed, half width {text(r['half_width_C'])}, rise {r['rise_C']:+.2f}"
-                   + (" AFTER A CHANGE" if r["after_change"] else "") + (" LEFT STANDING" if r["left_standing"] else "")
-                   + (f" ({r['state']})" if r["state"] != "live" else ""))
+        out.append(
+            f"  {r['file']} {r['channel']:4}{r['group']:20} at {r['at_min']:6.1f} min (limit {text(r['limit_min'], '{:.0f}')}) "
+            f"error {r['error_C']:+.3f} C of {r['tolerance_C']:.2f} allowed, half width {text(r['half_width_C'])}, rise {r['rise_C']:+.2f}"
+            + (" AFTER A CHANGE" if r["after_change"] else "")
+            + (" LEFT STANDING" if r["left_standing"] else "")
+            + (f" ({r['state']})" if r["state"] != "live" else "")
+        )
     silent = defaultdict(list)
     for run in runs:
         for r in run["rows"]:
@@ -287,7 +414,9 @@ def worst_cases(runs, count):
     if silent:
         out.append("declarable, and not declared:")
         for (file, group, reason), channels in sorted(silent.items(), key=lambda kv: -len(kv[1]))[:count]:
-            out.append(f"  {file} {group:20} {len(channels):2} channels ({' '.join(channels[:6])}{' ...' if len(channels) > 6 else ''}): {reason}")
+            out.append(
+                f"  {file} {group:20} {len(channels):2} channels ({' '.join(channels[:6])}{' ...' if len(channels) > 6 else ''}): {reason}"
+            )
     for run in runs:
         if run["failure"]:
             out.append(f"FAILED {run['file']}: {run['failure']}")
@@ -300,20 +429,36 @@ def worst_cases(runs, count):
 def compared(runs, baseline):
     """Declaration times against those of another scoring of the same files (with an archive against none)."""
     other = {(r["file"], r["channel"]): r for run in baseline["runs"] for r in run["rows"]}
-    pairs = [(r["at_min"], other[key]["at_min"]) for run in runs for r in run["rows"]
-             if (key := (r["file"], r["channel"])) in other and r["declared"] and other[key]["declared"] and r["declarable"]]
+    pairs = [
+        (r["at_min"], other[key]["at_min"])
+        for run in runs
+        for r in run["rows"]
+        if (key := (r["file"], r["channel"])) in other
+        and r["declared"]
+        and other[key]["declared"]
+        and r["declarable"]
+    ]
     ratios = [a / b for a, b in pairs]
     return {"pairs": len(pairs), "median_ratio": quantile(ratios, 0.5), "p90_ratio": quantile(ratios, 0.9)}
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("corpus", type=Path)
-    parser.add_argument("--thermbalctl", default="thermbalctl", help="the program (words are split: 'python3 fake.py')")
+    parser.add_argument(
+        "--thermbalctl", default="thermbalctl", help="the program (words are split: 'python3 fake.py')"
+    )
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--tolerance-C", type=float, default=0.2, dest="tolerance_C")
     parser.add_argument("--every-min", type=float, default=2.0)
-    parser.add_argument("--replay-arg", action="append", default=[], help="a further argument of replay, e.g. --replay-arg=--archive=X.db")
+    parser.add_argument(
+        "--replay-arg",
+        action="append",
+        default=[],
+        help="a further argument of replay, e.g. --replay-arg=--archive=X.db",
+    )
     parser.add_argument("--group", action="append", default=[], help="only runs of this group")
     parser.add_argument("--limit-runs", type=int, help="only the first N runs")
     parser.add_argument("--timeout-s", type=float, default=900.0)
@@ -321,10 +466,16 @@ def main():
     parser.add_argument("--json", type=Path, help="all figures and every channel's row")
     parser.add_argument("--save-replays", type=Path, help="keep the raw answers in this folder")
     parser.add_argument("--from-replays", type=Path, help="score kept answers instead of running anything")
-    parser.add_argument("--baseline", type=Path, help="a JSON of another scoring of the same files: prints declaration times against it")
+    parser.add_argument(
+        "--baseline",
+        type=Path,
+        help="a JSON of another scoring of the same files: prints declaration times against it",
+    )
     parser.add_argument("--progress", action="store_true")
     args = parser.parse_args()
-    chosen = [run for run in runs_of(args.corpus) if not args.group or run[1].group in args.group][:args.limit_runs]
+    chosen = [run for run in runs_of(args.corpus) if not args.group or run[1].group in args.group][
+        : args.limit_runs
+    ]
     runs = [judge_run(truth, answer) for (_, truth), answer in zip(chosen, answers_of(chosen, args))]
     by_group = defaultdict(list)
     for run in runs:

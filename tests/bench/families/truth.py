@@ -47,7 +47,12 @@ def wilson(hits, of, z=1.96):
 
 def runs_of(folder):
     """(csv, Truth) of every run of a corpus, in the order of their names."""
-    found = [(p.with_name(p.name.replace(".truth.json", ".csv")), Truth(p)) for p in sorted(Path(folder).glob("*.truth.json"))]
+    found = [
+        (p.with_name(p.name.replace(".truth.json", ".csv")), Truth(p))
+        for p in sorted(Path(folder).glob("*.truth.json"))
+    ]
     if not found:
-        raise SystemExit(f"{folder}: no *.truth.json here; make runs with tests/truth/make_corpus.py --out {folder}")
+        raise SystemExit(
+            f"{folder}: no *.truth.json here; make runs with tests/truth/make_corpus.py --out {folder}"
+        )
     return found
