@@ -57,7 +57,6 @@ bool TubeSolver::descend(double smoothing, double still, int most_steps) {
     for (int step = 0; step < most_steps; ++step) {
         ++newton_steps_;
         take_slopes();
-        find_bending_rows();
         gradient_ = state_.weights - slope_sum_;
         bias_gradient_ = -slopes_.sum();
         newton_direction();
@@ -84,18 +83,14 @@ void TubeSolver::take_slopes() {
         slopes_.setZero();
         slope_sum_is_fresh_ = true;
     }
-    for (Index i = 0; i < slopes_.size(); ++i) {
-        if (new_slopes_(i) == slopes_(i)) continue;
-        slope_sum_ += (new_slopes_(i) - slopes_(i)) * by_row_.col(i);
-        slopes_(i) = new_slopes_(i);
-    }
-}
-
-void TubeSolver::find_bending_rows() {
     bending_.clear();
     for (Index i = 0; i < slopes_.size(); ++i) {
-        const double size = std::abs(slopes_(i));
+        const double slope = new_slopes_(i);
+        const double size = std::abs(slope);
         if (size > 0.0 && size < tube_.C) bending_.push_back(i);
+        if (slope == slopes_(i)) continue;
+        slope_sum_ += (slope - slopes_(i)) * by_row_.col(i);
+        slopes_(i) = slope;
     }
 }
 
@@ -110,25 +105,40 @@ void TubeSolver::newton_direction() {
         bias_direction_ = -bias_gradient_ / (1e-3 * curvature);
         return;
     }
-    const MatrixXd bent = by_row_(Eigen::all, bending_);
+    bent_.resize(rank, rows);
+    for (Index k = 0; k < rows; ++k) bent_.col(k) = by_row_.col(bending_[static_cast<std::size_t>(k)]);
     if (rows > rank) {
-        const VectorXd mean = bent.rowwise().mean();
-        const MatrixXd centred = bent.colwise() - mean;
-        MatrixXd hessian = MatrixXd::Zero(rank, rank);
-        hessian.selfadjointView<Eigen::Lower>().rankUpdate(centred, curvature);
-        hessian.diagonal().array() += 1.0;
-        direction_ = hessian.selfadjointView<Eigen::Lower>().llt().solve(mean * bias_gradient_ - gradient_);
-        bias_direction_ = -bias_gradient_ / (curvature * static_cast<double>(rows)) - mean.dot(direction_);
-        return;
+        direction_in_feature_space(curvature);
+    } else {
+        direction_in_row_space(curvature);
     }
-    MatrixXd gram = MatrixXd::Zero(rows, rows);
-    gram.selfadjointView<Eigen::Lower>().rankUpdate(bent.transpose());
-    gram.diagonal().array() += 1.0 / curvature;
-    const auto factor = gram.selfadjointView<Eigen::Lower>().llt();
-    const VectorXd without_bias = factor.solve(-(bent.transpose() * gradient_));
-    const VectorXd of_bias = factor.solve(VectorXd::Ones(rows));
+}
+
+void TubeSolver::direction_in_feature_space(double curvature) {
+    const VectorXd mean = bent_.rowwise().mean();
+    bent_.colwise() -= mean;
+    square_.setZero(bent_.rows(), bent_.rows());
+    vector_loops::add_outer_products(bent_.data(), static_cast<std::size_t>(bent_.rows()),
+                                     static_cast<std::size_t>(bent_.cols()), square_.data());
+    square_ *= curvature;
+    square_.diagonal().array() += 1.0;
+    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(square_);
+    direction_ = factor.solve(mean * bias_gradient_ - gradient_);
+    bias_direction_ =
+        -bias_gradient_ / (curvature * static_cast<double>(bent_.cols())) - mean.dot(direction_);
+}
+
+void TubeSolver::direction_in_row_space(double curvature) {
+    const MatrixXd by_feature = bent_.transpose();
+    square_.setZero(by_feature.rows(), by_feature.rows());
+    vector_loops::add_outer_products(by_feature.data(), static_cast<std::size_t>(by_feature.rows()),
+                                     static_cast<std::size_t>(by_feature.cols()), square_.data());
+    square_.diagonal().array() += 1.0 / curvature;
+    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(square_);
+    const VectorXd without_bias = factor.solve(-(by_feature * gradient_));
+    const VectorXd of_bias = factor.solve(VectorXd::Ones(by_feature.rows()));
     bias_direction_ = (-bias_gradient_ - without_bias.sum()) / of_bias.sum();
-    direction_ = -gradient_ - bent * (without_bias + bias_direction_ * of_bias);
+    direction_ = -gradient_ - bent_ * (without_bias + bias_direction_ * of_bias);
 }
 
 /// The objective along the direction is convex and piecewise quadratic: safeguarded Newton to a slope a fifth
@@ -163,7 +173,6 @@ double TubeSolver::step_length() {
 /// Without a row on the edge of the tube the bias may lie anywhere between two of them; libsvm takes the
 /// middle.
 void TubeSolver::centre_undetermined_bias() {
-    find_bending_rows();
     if (!bending_.empty()) return;
     double lowest = -std::numeric_limits<double>::infinity();
     double highest = std::numeric_limits<double>::infinity();

@@ -68,6 +68,31 @@ void subtract_columns(const double* __restrict matrix, std::size_t rows, std::si
 }
 
 THERMBAL_EVERY_WIDTH
+void add_outer_products(const double* __restrict vectors, std::size_t length, std::size_t count,
+                        double* __restrict lower) {
+    std::size_t v = 0;
+    for (; v + 4 <= count; v += 4) {
+        const double* a = vectors + v * length;
+        const double* b = a + length;
+        const double* c = b + length;
+        const double* d = c + length;
+        for (std::size_t j = 0; j < length; ++j) {
+            double* column = lower + j * length;
+            for (std::size_t i = j; i < length; ++i) {
+                column[i] += (a[j] * a[i] + b[j] * b[i]) + (c[j] * c[i] + d[j] * d[i]);
+            }
+        }
+    }
+    for (; v < count; ++v) {
+        const double* a = vectors + v * length;
+        for (std::size_t j = 0; j < length; ++j) {
+            double* column = lower + j * length;
+            for (std::size_t i = j; i < length; ++i) column[i] += a[j] * a[i];
+        }
+    }
+}
+
+THERMBAL_EVERY_WIDTH
 void squared_distances_to(const double* __restrict series, std::size_t rows, const double* __restrict point,
                           std::size_t lags, double* __restrict distance) {
     for (std::size_t i = 0; i < rows; ++i) distance[i] = 0.0;

@@ -52,8 +52,9 @@ class TubeSolver {
   private:
     [[nodiscard]] bool descend(double smoothing, double still, int most_steps);
     void take_slopes();
-    void find_bending_rows();
     void newton_direction();
+    void direction_in_feature_space(double curvature);
+    void direction_in_row_space(double curvature);
     double step_length();
     void centre_undetermined_bias();
 
@@ -69,6 +70,8 @@ class TubeSolver {
     Eigen::VectorXd slope_sum_;  ///< sum of slopes_(i) * row i
     bool slope_sum_is_fresh_ = false;
     std::vector<Eigen::Index> bending_;  ///< rows where the loss is quadratic
+    Eigen::MatrixXd bent_;               ///< their features, one column a row
+    Eigen::MatrixXd square_;             ///< of the Newton system
     Eigen::VectorXd gradient_;
     double bias_gradient_ = 0.0;
     Eigen::VectorXd direction_;

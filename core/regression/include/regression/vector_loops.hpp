@@ -22,6 +22,10 @@ void squared_distances_to(const double* series, std::size_t rows, const double* 
 /// values[i] = exp(factor * values[i]); factor * values[i] must lie in [-700, 0]. Error below 2e-16.
 void scaled_exp(double* values, std::size_t count, double factor);
 
+/// lower += sum over c < count of v_c v_c', v_c = vectors[c * length ...]: the lower triangle of a length x
+/// length matrix, column by column.
+void add_outer_products(const double* vectors, std::size_t length, std::size_t count, double* lower);
+
 /// The epsilon-insensitive loss with its kink smoothed over `smoothing`: its slope is
 /// C * clamp((|residual| - epsilon) / smoothing, 0, 1), with the sign of the residual.
 struct Tube {
