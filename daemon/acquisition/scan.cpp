@@ -5,18 +5,6 @@
 
 namespace thermbal {
 
-std::string_view to_string(ScanStatus status) {
-    switch (status) {
-        case ScanStatus::ok:
-            return "ok";
-        case ScanStatus::late:
-            return "late";
-        case ScanStatus::missed:
-            break;
-    }
-    return "missed";
-}
-
 ScanAssembler::ScanAssembler(Grid grid, std::uint64_t generation, std::int64_t first_scan,
                              std::vector<std::size_t> channel_line, std::size_t lines)
     : grid_(grid),

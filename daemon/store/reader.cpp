@@ -312,9 +312,9 @@ Result<std::vector<DeclarationRecord>> Reader::declarations(TestId id) const {
     auto rows = database_->query(
         "SELECT c.name, d.window_end_scan, d.declared_at_min, d.n, d.C, d.sigma, d.steady_state_C, "
         "d.steady_state_low_C, d.steady_state_high_C, d.equilibrium_time_min, d.rmse_by_n_C, d.basis, "
-        "d.version "
+        "d.version, d.withdrawn "
         "FROM declarations d JOIN channels c ON c.test_id = d.test_id AND c.position = d.channel "
-        "WHERE d.test_id = ? ORDER BY d.channel",
+        "WHERE d.test_id = ? ORDER BY d.channel, d.window_end_scan",
         id);
     while (rows.next()) {
         DeclarationRecord declaration;
@@ -331,6 +331,7 @@ Result<std::vector<DeclarationRecord>> Reader::declarations(TestId id) const {
         declaration.rmse_by_n_C = curve_in(rows.text(10));
         declaration.basis_json = rows.text(11);
         declaration.version = rows.text(12);
+        declaration.withdrawn = rows.text(13);
         declarations.push_back(std::move(declaration));
     }
     if (auto status = rows.status(); !status) return std::unexpected(status.error());

@@ -138,7 +138,35 @@ CREATE TABLE archive (
 CREATE INDEX archive_of_a_machine ON archive (machine, id);
 )sql";
 
-constexpr std::array steps = {version_1, version_2};
+// A declaration that later samples contradict is withdrawn, kept, and may be followed by another one.
+constexpr const char* version_3 = R"sql(
+CREATE TABLE declarations_3 (
+  test_id INTEGER NOT NULL,
+  channel INTEGER NOT NULL,
+  window_end_scan INTEGER NOT NULL,
+  declared_at_min REAL NOT NULL,
+  n INTEGER NOT NULL,
+  C REAL,
+  sigma REAL,
+  steady_state_C REAL,
+  steady_state_low_C REAL,
+  steady_state_high_C REAL,
+  equilibrium_time_min REAL,
+  rmse_by_n_C TEXT NOT NULL,
+  basis TEXT NOT NULL,
+  version TEXT NOT NULL,
+  withdrawn TEXT NOT NULL DEFAULT '',
+  PRIMARY KEY (test_id, channel, window_end_scan),
+  FOREIGN KEY (test_id, channel) REFERENCES channels,
+  FOREIGN KEY (test_id, window_end_scan) REFERENCES scans
+) STRICT;
+INSERT INTO declarations_3 SELECT *, '' FROM declarations;
+DROP TABLE declarations;
+ALTER TABLE declarations_3 RENAME TO declarations;
+CREATE UNIQUE INDEX one_standing_declaration ON declarations (test_id, channel) WHERE withdrawn = '';
+)sql";
+
+constexpr std::array steps = {version_1, version_2, version_3};
 
 }  // namespace
 

@@ -186,6 +186,7 @@ bool may_follow(TestState from, TestState to) {
             return to != TestState::running;
         case TestState::declared:
             return to == TestState::stopped || to == TestState::aborted;
+        case TestState::idle:
         case TestState::stopped:
         case TestState::aborted:
             return false;
@@ -313,6 +314,17 @@ Result<void> Store::record_declaration(TestId id, const DeclarationRecord& decla
             declaration.C, declaration.sigma, declaration.steady_state_C, declaration.steady_state_low_C,
             declaration.steady_state_high_C, declaration.equilibrium_time_min,
             curve_json(declaration.rmse_by_n_C), declaration.basis_json, declaration.version);
+    });
+}
+
+Result<void> Store::withdraw_declaration(TestId id, std::string_view channel, std::string_view reason) {
+    auto& database = parts_->database();
+    return in_transaction(database, [&]() -> Result<void> {
+        const auto position = channel_position(database, id, std::string(channel));
+        if (!position) return std::unexpected(position.error());
+        return database.run(
+            "UPDATE declarations SET withdrawn = ? WHERE test_id = ? AND channel = ? AND withdrawn = ''", reason, id,
+            *position);
     });
 }
 

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "report/verdict_json.hpp"
+#include "service/notify.hpp"
 
 namespace thermbal {
 
@@ -29,7 +30,7 @@ void Daemon::take_scan(const Scan& scan) {
                                                    *options_.config.test.max_duration_min));
         }
     }
-    server_.publish("scan", channels_json().value_or(nullptr));
+    if (server_.counters().subscribers > 0) server_.publish("scan", channels_json().value_or(nullptr));
     if (!is_measuring(test_.state) || test_.submitted_scan != scan.scan) settle(scan.scan);
 }
 
@@ -64,11 +65,18 @@ void Daemon::decide() {
         spdlog::error("{}", stored.error().message);
     }
     event("all_declared", test_.decision.reason);
+    act_on_declaration();
+}
+
+void Daemon::act_on_declaration() {
     if (options_.config.test.keep_measuring) {
         event("keep_measuring", "the test goes on as configured, so that the prediction can be checked");
     } else {
-        end_test(TestEvent::stop, test_.decision.reason);
+        // The machine first: should the daemon die between the two, the next one finds the test declared and stops the
+        // machine again, rather than finding it stopped and never asking.
+        test_.end_reason = test_.decision.reason;
         carry_out_stop();
+        end_test(TestEvent::stop, test_.decision.reason);
     }
 }
 
@@ -82,6 +90,7 @@ void Daemon::end_test(TestEvent how, const std::string& reason) {
         spdlog::error("the end of test {} is not stored yet: {}", test_.id, stored.error().message);
     }
     event(to_string(*state), reason);
+    settle(test_.last_scan);
     server_.publish("status", status_json().value_or(nullptr));
     notify_status(fmt::format("test {}: {}", to_string(*state), reason));
 }
@@ -135,7 +144,8 @@ void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::
                                  .equilibrium_time_min = verdict.equilibrium_time_min,
                                  .rmse_by_n_C = verdict.rmse_by_n_C,
                                  .basis_json = verdict_to_json(verdict).dump(),
-                                 .version = options_.version};
+                                 .version = options_.version,
+                                 .withdrawn = {}};
         if (const auto stored = store_.record_declaration(test_.id, record); !stored) {
             spdlog::error("the declaration of {} is not stored: {}", verdict.channel, stored.error().message);
         }

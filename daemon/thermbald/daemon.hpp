@@ -20,7 +20,7 @@
 #include "modbus_line.hpp"
 #include "series/test_state.hpp"
 #include "service/hooks.hpp"
-#include "service/server.hpp"
+#include "service/socket_server.hpp"
 #include "statistics.hpp"
 #include "store/store.hpp"
 
@@ -77,6 +77,7 @@ class Daemon {
     bool identification_is_due(std::int64_t scan) const;
     void record_changes(const std::vector<DeclarationChange>& changes, std::int64_t window_end_scan);
     void decide();
+    void act_on_declaration();
     void end_test(TestEvent how, const std::string& reason);
     bool over_time(const Scan& scan) const;
 

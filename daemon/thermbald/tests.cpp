@@ -106,6 +106,7 @@ void Daemon::resume(ResumedTest resumed) {
     const std::int64_t missed = test_.grid.scan_at(clock_.monotonic_ns()) - last_scan - 1;
     event("resumed", fmt::format("test {} \"{}\" goes on: {} scans are stored, about {} were missed", test_.id,
                                  test_.name, last_scan + 1, std::max<std::int64_t>(missed, 0)));
+    if (test_.state == TestState::declared) act_on_declaration();
 }
 
 void Daemon::follow_grid(Grid grid, std::int64_t first_scan) {

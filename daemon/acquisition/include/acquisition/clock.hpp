@@ -35,6 +35,9 @@ class Clock {
     virtual std::int64_t real_ns_until(std::int64_t deadline_ns) const = 0;
 };
 
+/// CLOCK_MONOTONIC, whatever clock the grid runs on: how long something really took.
+std::int64_t real_monotonic_ns();
+
 /// CLOCK_BOOTTIME and CLOCK_REALTIME.
 std::unique_ptr<Clock> system_clock();
 

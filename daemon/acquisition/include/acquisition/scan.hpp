@@ -8,6 +8,7 @@
 
 #include "acquisition/grid.hpp"
 #include "series/sample.hpp"
+#include "series/test_state.hpp"
 
 namespace thermbal {
 
@@ -26,13 +27,6 @@ struct LineScan {
     std::int64_t wall_ns = 0;  ///< UTC when the read started
     std::vector<ChannelSample> samples;
 };
-
-enum class ScanStatus {
-    ok,
-    late,    ///< read, but began later than late_after_ns behind the grid
-    missed,  ///< not read at all: every sample is a gap
-};
-std::string_view to_string(ScanStatus status);
 
 /// One row of the grid, all channels in the order of the configuration.
 struct Scan {

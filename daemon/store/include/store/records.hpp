@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "series/sample.hpp"
+#include "series/test_state.hpp"
 
 namespace thermbal {
 
@@ -18,18 +19,6 @@ struct Moment {
     std::int64_t wall_ns = 0;
     std::int64_t monotonic_ns = 0;
 };
-
-/// running -> declared -> stopped; running or declared -> aborted; running -> stopped by hand. A test that is
-/// running or declared is open; there is at most one in a database.
-enum class TestState : std::uint8_t { running, declared, stopped, aborted };
-
-/// How a scan of the grid went. `repeated`: it took more than one attempt; `missed`: nothing was asked.
-enum class ScanStatus : std::uint8_t { ok, late, repeated, missed };
-
-std::string_view to_string(TestState state);
-std::string_view to_string(ScanStatus status);
-std::optional<TestState> test_state_from_string(std::string_view name);
-std::optional<ScanStatus> scan_status_from_string(std::string_view name);
 
 struct ChannelRecord {
     std::string name;  ///< T1 ... T16, unique in the test
@@ -60,7 +49,7 @@ struct StoredTest {
     std::string stop_reason;
     std::optional<std::int64_t> last_scan;  ///< index on the grid; empty before the first scan
 
-    bool open() const { return state == TestState::running || state == TestState::declared; }
+    bool open() const { return is_measuring(state); }
 };
 
 struct InputValue {
@@ -99,6 +88,7 @@ struct DeclarationRecord {
     std::vector<double> rmse_by_n_C;
     std::string basis_json = "{}";
     std::string version;
+    std::string withdrawn;  ///< why it does not stand any more; empty while it stands
 };
 
 /// What one identification said of one channel on the window that ends at `window_end_scan`.

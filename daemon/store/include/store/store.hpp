@@ -58,8 +58,10 @@ class Store {
     /// restart.
     Result<void> append_scans(TestId id, std::span<const ScanRecord> scans);
 
-    /// One declaration a channel: a second one for the same channel is refused.
+    /// One standing declaration a channel: a second one is refused until the first is withdrawn.
     Result<void> record_declaration(TestId id, const DeclarationRecord& declaration);
+    /// The standing declaration of a channel stands no more; it stays in the database with the reason.
+    Result<void> withdraw_declaration(TestId id, std::string_view channel, std::string_view reason);
     /// Of all channels of one window at once. The same channel and window again replaces what was said.
     Result<void> record_identifications(TestId id, std::span<const IdentificationRecord> identifications);
     /// Returns the event's id.

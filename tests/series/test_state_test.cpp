@@ -1,4 +1,4 @@
-#include "acquisition/test_state.hpp"
+#include "series/test_state.hpp"
 
 #include <gtest/gtest.h>
 

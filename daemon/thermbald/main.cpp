@@ -1,0 +1,114 @@
+#include <fmt/format.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "config/load.hpp"
+#include "daemon.hpp"
+#include "version.hpp"
+
+namespace {
+
+using namespace thermbal;
+
+struct Flags {
+    std::string config = "/etc/thermbal/thermbald.toml";
+    std::vector<std::string> profiles;
+    bool check = false;
+    double time_scale = 1.0;
+    std::int64_t time_epoch_ns = -1;
+    bool lockstep = false;
+    bool exit_when_ended = false;
+};
+
+/// The user's own profiles first, then the ones that came with the program.
+std::vector<std::string> profile_folders(const Flags& flags) {
+    std::vector<std::string> folders = flags.profiles;
+    folders.emplace_back("/etc/thermbal/profiles");
+    std::error_code none;
+    const auto program = std::filesystem::read_symlink("/proc/self/exe", none);
+    if (!none) folders.push_back((program.parent_path().parent_path() / "share/thermbal/profiles").string());
+    return folders;
+}
+
+std::string boot_id() {
+    std::ifstream file("/proc/sys/kernel/random/boot_id");
+    std::string id;
+    std::getline(file, id);
+    return id.empty() ? "unknown" : id;
+}
+
+/// The clock, and a name for it: monotonic times of another clock mean nothing on this one.
+std::pair<std::unique_ptr<Clock>, std::string> make_clock(const Flags& flags) {
+    if (flags.lockstep) {
+        const auto real = system_clock();
+        return {lockstep_clock(0, real->wall_ns()), fmt::format("lockstep {}", real->wall_ns())};
+    }
+    if (flags.time_scale != 1.0 || flags.time_epoch_ns >= 0) {
+        const std::int64_t epoch_ns = flags.time_epoch_ns >= 0 ? flags.time_epoch_ns : real_monotonic_ns();
+        return {scaled_clock(flags.time_scale, epoch_ns),
+                fmt::format("{} x{} from {}", boot_id(), flags.time_scale, epoch_ns)};
+    }
+    return {system_clock(), boot_id()};
+}
+
+int refused(const Error& error) {
+    fmt::print(stderr, "{}\n", error.message);
+    return error.next == NextStep::refuse_input ? 2 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app(
+        "Polls a temperature module during a thermal-balance test, declares where each channel will settle, and stops "
+        "the test.",
+        "thermbald");
+    Flags flags;
+    app.set_version_flag("--version", std::string("thermbald ") + version);
+    app.add_option("--config", flags.config, "configuration file")->capture_default_str();
+    app.add_flag("--check-config", flags.check, "check the configuration, print what is in effect, and end");
+    app.add_option("--profiles", flags.profiles, "a further folder with module profiles, looked up first");
+    app.add_flag("--exit-when-ended", flags.exit_when_ended, "end when a test has ended (demonstrations, tests)");
+    CLI::Option_group& time = *app.add_option_group("time", "Faster than time, with a simulated module:");
+    auto* scale = time.add_option("--time-scale", flags.time_scale, "run the clock so many times as fast")
+                      ->check(CLI::Range(0.01, 100000.0));
+    time.add_option("--time-epoch-ns", flags.time_epoch_ns, "CLOCK_MONOTONIC at which the scaled time is 0")->needs(scale);
+    time.add_flag("--lockstep", flags.lockstep, "the next scan is due when the work of the last one is done")->excludes(scale);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? 0 : 2;
+    }
+
+    auto config = load_config_file(flags.config, profiles_in(profile_folders(flags)));
+    if (!config) return refused(config.error());
+    if (flags.lockstep && config->lines.size() > 1) {
+        return refused({NextStep::refuse_input, fmt::format("{}: --lockstep needs a configuration with one line, found {}",
+                                                            flags.config, config->lines.size())});
+    }
+    if (flags.check) {
+        fmt::print("{}", explain_config(*config));
+        return 0;
+    }
+
+    spdlog::set_default_logger(spdlog::stderr_logger_mt("thermbald"));
+    spdlog::set_level(spdlog::level::from_str(config->log.level));
+    // Under systemd the journal stamps every line.
+    spdlog::set_pattern(std::getenv("JOURNAL_STREAM") != nullptr ? "%l: %v" : "%Y-%m-%dT%H:%M:%S.%e %l: %v");
+
+    auto [clock, clock_name] = make_clock(flags);
+    auto daemon = Daemon::create({std::move(*config), version, clock_name, flags.exit_when_ended}, *clock);
+    if (!daemon) return refused(daemon.error());
+    if (const auto ended = (*daemon)->run(); !ended) {
+        spdlog::critical("{}", ended.error().message);
+        return 1;
+    }
+    return 0;
+}
