@@ -28,8 +28,9 @@ ChannelModel::ChannelModel(const ReducedChannel& channel, const Basis& basis, co
     if (basis.has_ambient) {
         // In the end the channel follows the room: the gains' sum is one more observation.
         rows_.row(count).tail(basis.grid()).setOnes();
-        value_[count] = 1.0;
-        noise_variance_[count] = prior.ambient_gain_sd * prior.ambient_gain_sd;
+        const double loss = prior.ambient_gain_loss_per_C * channel.range_C;
+        value_[count] = 1.0 - loss;
+        noise_variance_[count] = prior.ambient_gain_sd * prior.ambient_gain_sd + loss * loss;
         prior_mean_.tail(basis.grid()) = prior.ambient_mean;
         prior_variance_.tail(basis.grid()) = prior.ambient_variance;
     }
@@ -41,13 +42,14 @@ ChannelModel::ChannelModel(const ReducedChannel& channel, const Basis& basis, co
     value_ -= rows_ * prior_mean_;
 }
 
-WhitenedChannel ChannelModel::whitened() const {
+WhitenedChannel ChannelModel::whitened(double direction) const {
     const Eigen::LLT<Eigen::MatrixXd> factor(background_covariance_);
     const Eigen::MatrixXd columns = factor.matrixL().solve(fine_);
     WhitenedChannel whitened;
     whitened.gram = columns.transpose() * columns;
     whitened.projected = columns.transpose() * factor.matrixL().solve(value_);
-    whitened.scale_squared = scale_squared_;
+    whitened.scale = std::sqrt(scale_squared_);
+    whitened.direction = direction;
     return whitened;
 }
 
@@ -62,21 +64,23 @@ Eigen::MatrixXd ChannelModel::columns_at(const std::vector<Mode>& modes) const {
     return columns;
 }
 
-void ChannelModel::condition_on(const Eigen::MatrixXd& columns, const Eigen::VectorXd& variance) {
+void ChannelModel::condition_on(const Eigen::MatrixXd& columns, const ModeAmplitudes& amplitudes) {
     columns_ = columns;
-    mode_variance_ = scale_squared_ * variance;
+    mode_variance_ = scale_squared_ * amplitudes.variance;
+    mode_mean_ = std::sqrt(scale_squared_) * amplitudes.mean;
+    left_ = value_ - columns_ * mode_mean_;
     Eigen::MatrixXd covariance = background_covariance_;
     covariance.noalias() += columns_ * mode_variance_.asDiagonal() * columns_.transpose();
     const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
     factor_ = factor.matrixL();
-    dual_ = factor.solve(value_);
+    dual_ = factor.solve(left_);
 }
 
 ConditionalValue ChannelModel::steady_state() const {
     const Eigen::VectorXd cross = cross_ + columns_ * mode_variance_;
     const Eigen::VectorXd half = factor_.triangularView<Eigen::Lower>().solve(cross);
     const double prior_variance = functional_variance_ + mode_variance_.sum();
-    return {functional_mean_ + cross.dot(dual_), std::max(0.0, prior_variance - half.squaredNorm())};
+    return {functional_mean_ + mode_mean_.sum() + cross.dot(dual_), std::max(0.0, prior_variance - half.squaredNorm())};
 }
 
 Eigen::VectorXd ChannelModel::mean_background() const {
@@ -84,7 +88,7 @@ Eigen::VectorXd ChannelModel::mean_background() const {
 }
 
 Eigen::VectorXd ChannelModel::mean_modes() const {
-    return mode_variance_.cwiseProduct(columns_.transpose() * dual_);
+    return mode_mean_ + mode_variance_.cwiseProduct(columns_.transpose() * dual_);
 }
 
 Eigen::VectorXd ChannelModel::draw(Random& random) const {
@@ -94,13 +98,13 @@ Eigen::VectorXd ChannelModel::draw(Random& random) const {
     for (Eigen::Index k = 0; k < basis; ++k) sample[k] = std::sqrt(prior_variance_[k]) * random.normal();
     for (Eigen::Index k = 0; k < modes; ++k)
         sample[basis + k] = std::sqrt(mode_variance_[k]) * random.normal();
-    Eigen::VectorXd missed = value_ - rows_ * sample.head(basis) - columns_ * sample.tail(modes);
+    Eigen::VectorXd missed = left_ - rows_ * sample.head(basis) - columns_ * sample.tail(modes);
     for (Eigen::Index k = 0; k < missed.size(); ++k)
         missed[k] -= std::sqrt(noise_variance_[k]) * random.normal();
     const Eigen::VectorXd half = factor_.triangularView<Eigen::Lower>().solve(missed);
     const Eigen::VectorXd dual = factor_.triangularView<Eigen::Lower>().transpose().solve(half);
     sample.head(basis) += prior_variance_.cwiseProduct(rows_.transpose() * dual) + prior_mean_;
-    sample.tail(modes) += mode_variance_.cwiseProduct(columns_.transpose() * dual);
+    sample.tail(modes) += mode_variance_.cwiseProduct(columns_.transpose() * dual) + mode_mean_;
     return sample;
 }
 

@@ -18,6 +18,7 @@ struct BackgroundPrior {
         level_profile;  ///< of the background, per time constant of the basis, relative to scale squared
     Eigen::VectorXd ambient_mean;  ///< empty without an ambient
     Eigen::VectorXd ambient_variance;
+    double ambient_gain_loss_per_C = 0.0;
     double ambient_gain_sd = 0.05;
 };
 
@@ -34,11 +35,10 @@ class ChannelModel {
                  double scale, const Eigen::VectorXd& functional);
 
     /// What the mode sampler needs.
-    WhitenedChannel whitened() const;
+    WhitenedChannel whitened(double direction) const;
 
-    /// Sets the modes everything below is conditional on. `columns` are rotated step columns at the modes,
-    /// `variance` their prior variances relative to the squared scale.
-    void condition_on(const Eigen::MatrixXd& columns, const Eigen::VectorXd& variance);
+    /// Sets the modes everything below is conditional on: rotated step columns and the prior of the amplitudes.
+    void condition_on(const Eigen::MatrixXd& columns, const ModeAmplitudes& amplitudes);
 
     Eigen::MatrixXd columns_at(const std::vector<Mode>& modes) const;
     ConditionalValue steady_state() const;
@@ -63,6 +63,8 @@ class ChannelModel {
 
     Eigen::MatrixXd columns_;
     Eigen::VectorXd mode_variance_;
+    Eigen::VectorXd mode_mean_;
+    Eigen::VectorXd left_;    // value less what the modes' prior means explain
     Eigen::MatrixXd factor_;  // lower triangle
     Eigen::VectorXd dual_;    // covariance^-1 (value - prior mean)
 };

@@ -302,6 +302,8 @@ std::vector<ReducedChannel> reduce_channels(const Eigen::MatrixXd& design, const
         const double block_excess = std::max(1.0, between / freedom / channel.sample_variance);
         channel.variance_inflation = block_excess * integrated_autocorrelation(residual);
         channel.residual_rms_C = std::sqrt(between / std::max(1.0, static_cast<double>(blocks.good)));
+        const Eigen::Index few = std::min<Eigen::Index>(3, blocks.mean.size());
+        channel.change_C = blocks.mean.tail(few).mean() - blocks.mean.head(few).mean();
         channel.range_C = blocks.mean.maxCoeff() - blocks.mean.minCoeff();
     }
     return result;

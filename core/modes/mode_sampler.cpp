@@ -36,27 +36,53 @@ double interpolate(const Eigen::MatrixXd& values, const Cell& row, const Cell& c
 }
 
 /// Log marginal likelihood of all channels given the modes, up to a constant.
-double log_likelihood(const std::vector<WhitenedChannel>& channels, const std::vector<Mode>& modes) {
+double log_likelihood(const std::vector<WhitenedChannel>& channels, const ModePrior& prior,
+                      const std::vector<Mode>& modes) {
     const std::size_t count = modes.size();
     std::array<Cell, room_for_modes> cells;
     std::array<double, room_for_modes> variance{};
+    std::array<double, room_for_modes> mean{};
     double log_variances = 0.0;
     const Eigen::Index points = channels.front().projected.size();
     for (std::size_t k = 0; k < count; ++k) {
         cells[k] = cell_of(modes[k].position, points);
-        variance[k] = std::exp(modes[k].log_variance);
-        log_variances += modes[k].log_variance;
+        const double share =
+            interpolate(prior.same_sign, modes[k].position) * std::abs(channels.front().direction);
+        variance[k] = std::exp(modes[k].log_variance) * (1.0 - share * share);
+        mean[k] = std::exp(0.5 * modes[k].log_variance) * share;
+        log_variances += std::log(variance[k]);
     }
     double total = 0.0;
     std::array<std::array<double, room_for_modes>, room_for_modes> factor;
+    std::array<double, room_for_modes> expected{};
+    std::array<double, room_for_modes> projected{};
     std::array<double, room_for_modes> solved{};
     for (const WhitenedChannel& channel : channels) {
+        const double scale_squared = channel.scale * channel.scale;
+        const double signed_scale = channel.direction < 0.0 ? -channel.scale : channel.scale;
         double log_determinant = 0.0;
         double fitted = 0.0;
         for (std::size_t row = 0; row < count; ++row) {
+            const Cell& cell = cells[row];
+            projected[row] = (1.0 - cell.share) * channel.projected[cell.below] +
+                             cell.share * channel.projected[cell.below + 1];
+            expected[row] = signed_scale * mean[row];
+        }
+        // Of the data less what the means explain: their own misfit here, the modes' gain below.
+        std::array<double, room_for_modes> left = projected;
+        for (std::size_t row = 0; row < count; ++row) {
             for (std::size_t column = 0; column <= row; ++column) {
-                double value = interpolate(channel.gram, cells[row], cells[column]);
-                if (row == column) value += 1.0 / (channel.scale_squared * variance[row]);
+                factor[row][column] = interpolate(channel.gram, cells[row], cells[column]);
+                left[row] -= factor[row][column] * expected[column];
+                if (column < row) left[column] -= factor[row][column] * expected[row];
+            }
+        }
+        double of_mean = 0.0;
+        for (std::size_t row = 0; row < count; ++row) of_mean += expected[row] * (projected[row] + left[row]);
+        for (std::size_t row = 0; row < count; ++row) {
+            for (std::size_t column = 0; column <= row; ++column) {
+                double value = factor[row][column];
+                if (row == column) value += 1.0 / (scale_squared * variance[row]);
                 for (std::size_t k = 0; k < column; ++k) value -= factor[row][k] * factor[column][k];
                 if (row == column) {
                     value = std::max(value, 1e-12);
@@ -66,15 +92,13 @@ double log_likelihood(const std::vector<WhitenedChannel>& channels, const std::v
                     factor[row][column] = value / factor[column][column];
                 }
             }
-            const Cell& cell = cells[row];
-            double value = (1.0 - cell.share) * channel.projected[cell.below] +
-                           cell.share * channel.projected[cell.below + 1];
+            double value = left[row];
             for (std::size_t k = 0; k < row; ++k) value -= factor[row][k] * solved[k];
             solved[row] = value / factor[row][row];
             fitted += solved[row] * solved[row];
         }
-        total += 0.5 * (fitted - log_determinant - log_variances -
-                        static_cast<double>(count) * std::log(channel.scale_squared));
+        total += 0.5 * (of_mean + fitted - log_determinant - log_variances -
+                        static_cast<double>(count) * std::log(scale_squared));
     }
     return total;
 }
@@ -96,7 +120,7 @@ class Chain {
             const double share = (static_cast<double>(k) + 0.5) / 5.0;
             modes_.push_back({share * 0.8 * last_, -1.0});
         }
-        log_likelihood_ = log_likelihood(channels_, modes_);
+        log_likelihood_ = log_likelihood(channels_, prior_, modes_);
     }
 
     void sweep(double temperature) {
@@ -145,7 +169,7 @@ class Chain {
     }
 
     bool accept(std::vector<Mode>& proposed, double log_prior_ratio) {
-        const double likelihood = log_likelihood(channels_, proposed);
+        const double likelihood = log_likelihood(channels_, prior_, proposed);
         const double log_ratio = (likelihood - log_likelihood_) / temperature_ + log_prior_ratio;
         if (!(std::log(random_.uniform()) < log_ratio)) return false;
         modes_.swap(proposed);
@@ -228,6 +252,19 @@ class Chain {
 };
 
 }  // namespace
+
+ModeAmplitudes relative_amplitudes(const std::vector<Mode>& modes, const ModePrior& prior, double direction) {
+    ModeAmplitudes amplitudes;
+    amplitudes.variance.resize(static_cast<Eigen::Index>(modes.size()));
+    amplitudes.mean.resize(static_cast<Eigen::Index>(modes.size()));
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+        const auto index = static_cast<Eigen::Index>(k);
+        const double share = interpolate(prior.same_sign, modes[k].position) * std::abs(direction);
+        amplitudes.variance[index] = std::exp(modes[k].log_variance) * (1.0 - share * share);
+        amplitudes.mean[index] = std::exp(0.5 * modes[k].log_variance) * std::copysign(share, direction);
+    }
+    return amplitudes;
+}
 
 std::vector<std::vector<Mode>> sample_modes(const std::vector<WhitenedChannel>& channels,
                                             const ModePrior& prior, std::size_t burn_in, std::size_t kept,

@@ -17,6 +17,7 @@ struct ModePrior {
     Eigen::VectorXd intensity;
     Eigen::VectorXd log_variance_mean;
     Eigen::VectorXd log_variance_sd;
+    Eigen::VectorXd same_sign;  ///< share of a mode's amplitude, rms over channels, that has the machine's direction
     std::size_t most_modes = 14;
 };
 
@@ -25,13 +26,22 @@ struct ModePrior {
 struct WhitenedChannel {
     Eigen::MatrixXd gram;       ///< U'U on the prior's grid
     Eigen::VectorXd projected;  ///< U'z
-    double scale_squared = 1.0;
+    double scale = 1.0;
+    double direction = 0.0;  ///< +1 warming, -1 cooling, 0 (or between) if the channels disagree
 };
 
 struct Mode {
     double position = 0.0;  ///< on the prior's grid, continuous
     double log_variance = 0.0;
 };
+
+/// What a state says about each mode: variance of its amplitude and mean, relative to the channel's scale.
+struct ModeAmplitudes {
+    Eigen::VectorXd variance;
+    Eigen::VectorXd mean;
+};
+
+ModeAmplitudes relative_amplitudes(const std::vector<Mode>& modes, const ModePrior& prior, double direction);
 
 /// Reversible-jump Metropolis-Hastings (Green 1995) over number, time constants and variances of the modes,
 /// the amplitudes marginalised: birth, death, moves of one mode. Returns the states kept: every `thinning`-th

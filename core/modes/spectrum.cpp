@@ -8,6 +8,7 @@
 
 #include "channel_model.hpp"
 #include "design.hpp"
+#include "generic_prior.hpp"
 #include "mode_sampler.hpp"
 #include "random.hpp"
 #include "series/sample.hpp"
@@ -28,26 +29,21 @@ std::size_t scans_per_block(const TestWindow& window, const SpectrumOptions& opt
 }
 
 ModePrior mode_prior(const std::optional<SpectrumPrior>& archive, const SpectrumOptions& options) {
-    const auto points = static_cast<Eigen::Index>(options.grid);
+    const GenericPrior generic = generic_prior(options);
+    const std::vector<double>& grid = generic.time_constant_min;
+    const auto vector_of = [](const std::vector<double>& values) {
+        return Eigen::VectorXd(
+            Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size())));
+    };
     ModePrior prior;
-    prior.log_tau.resize(points);
-    prior.intensity.resize(points);
-    prior.log_variance_mean = Eigen::VectorXd::Constant(points, options.mode_log_variance_mean);
-    prior.log_variance_sd = Eigen::VectorXd::Constant(points, options.mode_log_variance_sd);
-    const std::vector<double> grid = logarithmic_grid(options.fastest_min, options.slowest_min, options.grid);
-    for (Eigen::Index g = 0; g < points; ++g) {
-        const double tau = grid[static_cast<std::size_t>(g)];
-        prior.log_tau[g] = std::log(tau);
-        prior.intensity[g] =
-            tau > options.falloff_min ? std::pow(options.falloff_min / tau, options.falloff_power) : 1.0;
-    }
-    prior.intensity *= options.expected_modes / prior.intensity.sum();
-    if (!archive) return prior;
-    for (Eigen::Index g = 0; g < points; ++g) {
-        const auto index = static_cast<std::size_t>(g);
-        prior.intensity[g] = archive->intensity[index];
-        prior.log_variance_mean[g] = archive->log_variance_mean[index];
-        prior.log_variance_sd[g] = archive->log_variance_sd[index];
+    prior.log_tau = vector_of(grid).array().log();
+    prior.intensity = vector_of(archive ? archive->intensity : generic.intensity);
+    prior.log_variance_mean = vector_of(archive ? archive->log_variance_mean : generic.log_variance_mean);
+    prior.log_variance_sd = vector_of(archive ? archive->log_variance_sd : generic.log_variance_sd);
+    prior.same_sign.resize(prior.log_tau.size());
+    for (std::size_t g = 0; g < grid.size(); ++g) {
+        const double ratio = options.same_sign_min / grid[g];
+        prior.same_sign[static_cast<Eigen::Index>(g)] = options.same_sign / (1.0 + ratio * ratio);
     }
     return prior;
 }
@@ -57,6 +53,7 @@ BackgroundPrior background_prior(const Basis& basis, const SpectrumOptions& opti
     BackgroundPrior prior;
     prior.level_profile.resize(grid);
     prior.ambient_gain_sd = options.ambient_gain_sd;
+    prior.ambient_gain_loss_per_C = options.ambient_gain_loss_per_C;
     for (Eigen::Index j = 0; j < grid; ++j) {
         const double tau = basis.time_constant_min[static_cast<std::size_t>(j)];
         const double falloff =
@@ -214,11 +211,18 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
-Eigen::VectorXd relative_variances(const std::vector<Mode>& modes) {
-    Eigen::VectorXd variance(static_cast<Eigen::Index>(modes.size()));
-    for (std::size_t k = 0; k < modes.size(); ++k)
-        variance[static_cast<Eigen::Index>(k)] = std::exp(modes[k].log_variance);
-    return variance;
+/// +1 if all channels warm, -1 if all cool, towards 0 as they disagree: then nothing is said about signs.
+double common_direction(const std::vector<ReducedChannel>& channels, const std::vector<std::size_t>& used) {
+    constexpr double disagreement = 0.6;
+    double net = 0.0;
+    double total = 0.0;
+    for (const std::size_t i : used) {
+        net += channels[i].change_C;
+        total += std::abs(channels[i].change_C);
+    }
+    if (total == 0.0) return 0.0;
+    const double agreement = std::abs(net) / total;
+    return std::copysign(std::max(0.0, (agreement - disagreement) / (1.0 - disagreement)), net);
 }
 
 /// Spreads one value a mode over the two grid points about each mode.
@@ -242,6 +246,21 @@ Eigen::MatrixXd mode_curves(const std::vector<Mode>& modes, const ModePrior& pri
 }
 
 }  // namespace
+
+GenericPrior generic_prior(const SpectrumOptions& options) {
+    GenericPrior prior;
+    prior.time_constant_min = logarithmic_grid(options.fastest_min, options.slowest_min, options.grid);
+    double sum = 0.0;
+    for (const double tau : prior.time_constant_min) {
+        prior.intensity.push_back(
+            tau > options.falloff_min ? std::pow(options.falloff_min / tau, options.falloff_power) : 1.0);
+        sum += prior.intensity.back();
+    }
+    for (double& value : prior.intensity) value *= options.expected_modes / sum;
+    prior.log_variance_mean.assign(options.grid, options.mode_log_variance_mean);
+    prior.log_variance_sd.assign(options.grid, options.mode_log_variance_sd);
+    return prior;
+}
 
 Result<void> SpectrumOptions::check() const {
     const auto refuse = [](std::string_view field, double found, std::string_view accepted) {
@@ -309,13 +328,14 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
     const Eigen::VectorXd functional = steady_state_functional(basis, room);
     const BackgroundPrior background = background_prior(basis, options);
     const ModePrior modes_prior = mode_prior(prior, options);
+    const double direction = common_direction(reduced, used);
     std::vector<ChannelModel> models;
     std::vector<WhitenedChannel> whitened;
     for (const std::size_t i : used) {
         const double scale = std::sqrt(reduced[i].range_C * reduced[i].range_C + common * common +
                                        9.0 * reduced[i].sample_variance);
         models.emplace_back(reduced[i], basis, background, scale, functional);
-        whitened.push_back(models.back().whitened());
+        whitened.push_back(models.back().whitened(direction));
     }
     const std::vector<std::vector<Mode>> states =
         sample_modes(whitened, modes_prior, options.burn_in, options.draws, options.thinning, seed);
@@ -334,15 +354,18 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
     const double start_min = window.start_s / seconds_per_min;
     for (std::size_t state = 0; state < states.size(); ++state) {
         const std::vector<Mode>& modes = states[state];
-        const Eigen::VectorXd variance = relative_variances(modes);
-        add_on_grid(modes, Eigen::VectorXd::Ones(variance.size()), share, density);
-        add_on_grid(modes, variance.array().log().matrix(), share, log_variance);
+        const ModeAmplitudes amplitudes = relative_amplitudes(modes, modes_prior, direction);
+        const auto count = static_cast<Eigen::Index>(modes.size());
+        Eigen::VectorXd logs(count);
+        for (Eigen::Index k = 0; k < count; ++k) logs[k] = modes[static_cast<std::size_t>(k)].log_variance;
+        add_on_grid(modes, Eigen::VectorXd::Ones(count), share, density);
+        add_on_grid(modes, logs, share, log_variance);
         const bool with_curve = state % curve_every == 0;
         const Eigen::MatrixXd steps =
             with_curve ? mode_curves(modes, modes_prior, curves.minute) : Eigen::MatrixXd();
         for (std::size_t k = 0; k < used.size(); ++k) {
             ChannelModel& model = models[k];
-            model.condition_on(model.columns_at(modes), variance);
+            model.condition_on(model.columns_at(modes), amplitudes);
             const ConditionalValue value = model.steady_state();
             draws[k].mean.push_back(value.mean);
             draws[k].variance.push_back(value.variance);
@@ -351,9 +374,9 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
             if (!with_curve) continue;
             const Eigen::VectorXd sample = model.draw(random);
             const Eigen::VectorXd curve =
-                curves.design * sample.head(basis.size()) + steps * sample.tail(variance.size());
+                curves.design * sample.head(basis.size()) + steps * sample.tail(count);
             const double settled =
-                functional.dot(sample.head(basis.size())) + sample.tail(variance.size()).sum();
+                functional.dot(sample.head(basis.size())) + sample.tail(count).sum();
             const double given = start_level_C.empty()
                                      ? no_value
                                      : start_level_C[structural[used[k]]] - reduced[used[k]].centre_C;

@@ -22,17 +22,21 @@ struct SpectrumOptions {
 
     double expected_modes = 5.0;  ///< a priori, over the whole range
     double falloff_min = 60.0;    ///< beyond this time constant modes are rarer ...
-    double falloff_power = 1.5;   ///< ... as (falloff / tau)^power
+    double falloff_power = 2.5;   ///< ... as (falloff / tau)^power
     double mode_log_variance_mean =
         -3.0;  ///< of a mode's variance relative to the channel's squared scale, natural log
     double mode_log_variance_sd = 2.0;
+    double same_sign = 0.5;      ///< slow modes move all channels the same way: share of their rms amplitude ...
+    double same_sign_min = 30.0; ///< ... reached well above this time constant
     double scale_floor = 0.5;  ///< least scale of a channel, as a share of the median range of all channels
 
     std::size_t background_points =
         28;                          ///< grid of the continuous background and of the response to the room
     double background_level = 1e-4;  ///< variance of a background amplitude, relative to the squared scale
 
-    double ambient_gain_sd = 0.05;     ///< how well the channel follows the room in the end: 1 +- this
+    // Friction falls as the machine warms: a channel follows the room the less, the more its own heat raises it.
+    double ambient_gain_loss_per_C = 0.012;  ///< in the end it follows with a gain of 1 less this times its rise so far ...
+    double ambient_gain_sd = 0.02;          ///< ... give or take this and the loss itself
     double ambient_centre_min = 60.0;  ///< median time constant of the response to the room, a priori
     double ambient_spread = 1.2;       ///< its spread, sd of log(tau)
     double ambient_tail_min = 15.0;    ///< the ambient stays at its mean over the last so many minutes

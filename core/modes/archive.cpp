@@ -1,0 +1,125 @@
+#include "modes/archive.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "generic_prior.hpp"
+
+namespace thermbal {
+
+namespace {
+
+/// Cumulative share of the modes' variance along the grid.
+std::vector<double> cumulative_variance(const std::vector<double>& density, const std::vector<double>& log_variance) {
+    std::vector<double> cumulative(density.size(), 0.0);
+    double sum = 0.0;
+    for (std::size_t g = 0; g < density.size(); ++g) {
+        sum += density[g] * std::exp(log_variance[g]);
+        cumulative[g] = sum;
+    }
+    if (sum > 0.0) {
+        for (double& value : cumulative) value /= sum;
+    }
+    return cumulative;
+}
+
+double distance_between(const std::vector<double>& first, const std::vector<double>& second, double spacing) {
+    double area = 0.0;
+    for (std::size_t g = 0; g < first.size(); ++g) area += std::abs(first[g] - second[g]) * spacing;
+    return area;
+}
+
+double log_spacing(const std::vector<double>& grid) { return std::log(grid[1] / grid[0]); }
+
+}  // namespace
+
+ArchivedSpectrum archived(const SpectrumEstimate& complete_test) {
+    return {complete_test.time_constant_min, complete_test.mode_density, complete_test.mode_log_variance};
+}
+
+Result<SpectrumPrior> learn_prior(const std::vector<ArchivedSpectrum>& tests, const SpectrumOptions& spectrum,
+                                  const ArchiveOptions& options) {
+    if (tests.size() < std::max<std::size_t>(1, options.tests_for_trust)) {
+        return fail(NextStep::refuse_input, fmt::format("{} earlier tests are not enough to learn from", tests.size()));
+    }
+    const GenericPrior generic = generic_prior(spectrum);
+    const std::size_t points = generic.time_constant_min.size();
+    for (const ArchivedSpectrum& test : tests) {
+        const bool fits = test.time_constant_min.size() == points && test.mode_density.size() == points &&
+                          test.mode_log_variance.size() == points &&
+                          std::abs(test.time_constant_min.back() / generic.time_constant_min.back() - 1.0) < 1e-6;
+        if (!fits) {
+            return fail(NextStep::refuse_input,
+                        fmt::format("a stored spectrum has {} time constants, {} are expected: identify that test again",
+                                    test.time_constant_min.size(), points));
+        }
+    }
+    const double spacing = log_spacing(generic.time_constant_min);
+    const double reach = options.blur_log_tau / spacing;
+    SpectrumPrior prior;
+    prior.time_constant_min = generic.time_constant_min;
+    prior.tests = tests.size();
+    for (std::size_t g = 0; g < points; ++g) {
+        double density = 0.0;
+        double log_variance = 0.0;
+        double square = 0.0;
+        for (const ArchivedSpectrum& test : tests) {
+            for (std::size_t other = 0; other < points; ++other) {
+                const double z = (static_cast<double>(g) - static_cast<double>(other)) / reach;
+                if (std::abs(z) > 4.0) continue;
+                const double weight = std::exp(-0.5 * z * z) / (reach * std::sqrt(2.0 * 3.141592653589793)) *
+                                      test.mode_density[other] / static_cast<double>(tests.size());
+                density += weight;
+                log_variance += weight * test.mode_log_variance[other];
+                square += weight * test.mode_log_variance[other] * test.mode_log_variance[other];
+            }
+        }
+        const double strange = options.generic_share * generic.intensity[g];
+        density += strange;
+        log_variance += strange * generic.log_variance_mean[g];
+        square += strange * (generic.log_variance_mean[g] * generic.log_variance_mean[g] +
+                             generic.log_variance_sd[g] * generic.log_variance_sd[g]);
+        const double mean = log_variance / density;
+        const double spread = std::sqrt(std::max(0.0, square / density - mean * mean));
+        prior.intensity.push_back(density);
+        prior.log_variance_mean.push_back(mean);
+        prior.log_variance_sd.push_back(std::max(options.log_variance_sd_least, spread));
+    }
+    return prior;
+}
+
+Contradiction compare_with_archive(const SpectrumEstimate& current, const std::vector<ArchivedSpectrum>& tests,
+                                   double trusted_after, double least_distance) {
+    Contradiction result;
+    if (tests.empty() || current.time_constant_min.size() < 2) return result;
+    const double spacing = log_spacing(current.time_constant_min);
+    const std::vector<double> now = cumulative_variance(current.mode_density, current.mode_log_variance);
+    std::vector<std::vector<double>> before;
+    for (const ArchivedSpectrum& test : tests) {
+        if (test.mode_density.size() != now.size()) continue;
+        before.push_back(cumulative_variance(test.mode_density, test.mode_log_variance));
+    }
+    if (before.empty()) return result;
+    result.distance = distance_between(now, before.front(), spacing);
+    for (std::size_t a = 0; a < before.size(); ++a) {
+        result.distance = std::min(result.distance, distance_between(now, before[a], spacing));
+        for (std::size_t b = a + 1; b < before.size(); ++b) {
+            result.usual_distance = std::max(result.usual_distance, distance_between(before[a], before[b], spacing));
+        }
+    }
+    const double span_min = (current.window_end_s - current.window_start_s) / 60.0;
+    const bool trusted = span_min >= trusted_after * current.slowest_time_constant_min;
+    const double allowed = std::max(least_distance, 1.5 * result.usual_distance);
+    result.contradicted = trusted && result.distance > allowed;
+    result.reason = fmt::format(
+        "the spectrum of time constants lies {:.2f} (in log tau) from the nearest of {} earlier tests, {:.2f} is allowed{}",
+        result.distance, before.size(), allowed,
+        result.contradicted ? ": the machine is not the one of the archive, its prior is dropped"
+        : trusted           ? ""
+                            : "; the window is too short to judge");
+    return result;
+}
+
+}  // namespace thermbal
