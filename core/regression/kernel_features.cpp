@@ -9,12 +9,35 @@
 
 namespace thermbal {
 
-KernelFeatures kernel_features(const LagProblem& problem, double sigma, double tolerance) {
-    const std::size_t rows = problem.rows();
+namespace {
+
+/// Every stride-th row, lag by lag: lag l of row k * stride is at()[l][k].
+class StridedLags {
+  public:
+    StridedLags(const LagProblem& problem, std::size_t stride) : phases_(stride) {
+        for (std::size_t k = 0; k < problem.unit.size(); ++k) phases_[k % stride].push_back(problem.unit[k]);
+        for (std::size_t l = 0; l < problem.lags; ++l)
+            lagged_.push_back(phases_[l % stride].data() + l / stride);
+    }
+
+    const double* const* at() const { return lagged_.data(); }
+
+  private:
+    std::vector<std::vector<double>> phases_;
+    std::vector<const double*> lagged_;
+};
+
+}  // namespace
+
+KernelFeatures kernel_features(const LagProblem& problem, double sigma, double tolerance,
+                               std::size_t stride) {
+    const StridedLags lags(problem, stride);
+    const std::size_t rows = (problem.rows() + stride - 1) / stride;
     std::vector<double> left_over(rows, 1.0);
     std::vector<double> columns;
     std::vector<double> pivot_row;
     KernelFeatures kernel;
+    kernel.stride = stride;
     while (kernel.pivots.size() < rows) {
         const auto largest = std::ranges::max_element(left_over);
         if (!(*largest > tolerance)) break;
@@ -25,7 +48,7 @@ KernelFeatures kernel_features(const LagProblem& problem, double sigma, double t
         const double diagonal = std::sqrt(*largest);
         columns.resize((rank + 1) * rows);
         double* column = columns.data() + rank * rows;
-        vector_loops::squared_distances_to(problem.unit.data(), rows, problem.input(pivot).data(),
+        vector_loops::squared_distances_to(lags.at(), rows, problem.input(pivot * stride).data(),
                                            problem.lags, column);
         vector_loops::scaled_exp(column, rows, -1.0 / (sigma * sigma));
         vector_loops::subtract_columns(columns.data(), rows, rank, pivot_row.data(), column);
@@ -34,7 +57,7 @@ KernelFeatures kernel_features(const LagProblem& problem, double sigma, double t
             left_over[i] -= column[i] * column[i];
         }
         left_over[pivot] = 0.0;
-        kernel.pivots.push_back(pivot);
+        kernel.pivots.push_back(pivot * stride);
     }
     kernel.features = Eigen::Map<const Eigen::MatrixXd>(columns.data(), static_cast<Eigen::Index>(rows),
                                                         static_cast<Eigen::Index>(kernel.pivots.size()));
@@ -46,10 +69,22 @@ double feature_tolerance(double sigma) {
 }
 
 std::vector<double> pivot_coefficients(const KernelFeatures& kernel, const Eigen::VectorXd& weights) {
-    const std::vector<Eigen::Index> pivots(kernel.pivots.begin(), kernel.pivots.end());
+    std::vector<Eigen::Index> pivots;
+    for (const std::size_t row : kernel.pivots)
+        pivots.push_back(static_cast<Eigen::Index>(row / kernel.stride));
     const Eigen::MatrixXd lower = kernel.features(pivots, Eigen::all);
     const Eigen::VectorXd solved = lower.transpose().triangularView<Eigen::Upper>().solve(weights);
     return {solved.begin(), solved.end()};
+}
+
+Eigen::VectorXd weights_of(const KernelFeatures& features, const std::vector<std::size_t>& rows,
+                           const std::vector<double>& coefficients) {
+    Eigen::VectorXd weights = Eigen::VectorXd::Zero(features.features.cols());
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+        weights += coefficients[k] *
+                   features.features.row(static_cast<Eigen::Index>(rows[k] / features.stride)).transpose();
+    }
+    return weights;
 }
 
 }  // namespace thermbal

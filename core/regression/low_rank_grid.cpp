@@ -16,41 +16,45 @@ namespace thermbal {
 namespace {
 
 using Schedule = TubeSolver::Schedule;
+using Eigen::Index;
+using Eigen::VectorXd;
 
-constexpr double cross_validation_tolerance_factor = 10.0;
-/// Where on the grid to look: the smoothing moves a prediction by about as much as it is wide.
+/// Where on the grid to look: on every few rows, C made up for them, and not to the last digit.
+constexpr std::size_t rough_rows = 400;
+constexpr double rough_tolerance_factor = 100.0;
 constexpr double rough_smoothing = 3e-4;
-constexpr double fine_smoothing = 1e-7;
-constexpr Schedule cold{.first_smoothing = 0.5, .factor = 0.1, .last_smoothing = rough_smoothing};
+constexpr Schedule cold{.first_smoothing = 0.03, .factor = 0.1, .last_smoothing = rough_smoothing};
 constexpr Schedule along_C{.first_smoothing = 0.03, .factor = 0.1, .last_smoothing = rough_smoothing};
-constexpr Schedule refine{.first_smoothing = 1e-4, .factor = 0.1, .last_smoothing = fine_smoothing};
+
+/// What is chosen by: the smoothing moves a prediction by about as much as it is wide.
+constexpr double fine_tolerance_factor = 10.0;
+constexpr double fine_smoothing = 1e-7;
+constexpr Schedule refine{.first_smoothing = 1e-3, .factor = 0.1, .last_smoothing = fine_smoothing};
 constexpr Schedule across_folds{.first_smoothing = 0.01, .factor = 0.1, .last_smoothing = fine_smoothing};
+
 /// For what the quicker ones did not bring to an end.
 constexpr Schedule patient{
     .first_smoothing = 0.5, .factor = 0.3, .last_smoothing = fine_smoothing, .most_steps = 1000};
 constexpr Schedule exact{.first_smoothing = 0.5, .factor = 0.1, .last_smoothing = 1e-9, .most_steps = 1000};
 
-std::vector<Eigen::Index> to_indices(const std::vector<std::size_t>& rows) {
-    return {rows.begin(), rows.end()};
-}
-
-/// One fold at one sigma: a solver on its training rows, and what is held out.
+/// One fold at one sigma: a solver on its training rows, and what is held out; of the rows that the features
+/// have.
 class FoldFits {
   public:
-    FoldFits(const KernelFeatures& kernel, const Fold& fold, const Eigen::VectorXd& targets, double epsilon)
-        : solver_(kernel.features(to_indices(fold.training_rows), Eigen::all),
-                  targets(to_indices(fold.training_rows)), epsilon),
-          held_out_(kernel.features(to_indices(fold.held_out_rows), Eigen::all)),
-          held_out_targets_(targets(to_indices(fold.held_out_rows))) {}
+    FoldFits(const KernelFeatures& kernel, const Fold& fold, const VectorXd& targets, double epsilon)
+        : solver_(kernel.features(feature_rows(fold.training_rows, kernel.stride), Eigen::all),
+                  targets(problem_rows(fold.training_rows, kernel.stride)), epsilon),
+          held_out_(kernel.features(feature_rows(fold.held_out_rows, kernel.stride), Eigen::all)),
+          held_out_targets_(targets(problem_rows(fold.held_out_rows, kernel.stride))) {}
 
     /// Held-out mean squared error of the fit at C, which is searched from `start`.
     double mse(double C, const TubeSolver::State& start, const Schedule& schedule) {
         if (!solver_.fit(C, start, schedule)) {
-            // The state after the patient schedule is used as it is: 1000 steps at one smoothing have not
-            // been seen to fail.
+            // 1000 steps at one smoothing have not been seen to fall short; the state is the best there is in
+            // any case.
             static_cast<void>(solver_.fit(C, solver_.cold_start(), patient));
         }
-        const Eigen::VectorXd error =
+        const VectorXd error =
             ((held_out_ * solver_.state().weights).array() + solver_.state().bias).matrix() -
             held_out_targets_;
         return error.squaredNorm() / static_cast<double>(error.size());
@@ -59,16 +63,30 @@ class FoldFits {
     const TubeSolver& solver() const { return solver_; }
 
   private:
+    static std::vector<Index> problem_rows(const std::vector<std::size_t>& rows, std::size_t stride) {
+        std::vector<Index> kept;
+        for (const std::size_t row : rows) {
+            if (row % stride == 0) kept.push_back(static_cast<Index>(row));
+        }
+        return kept;
+    }
+
+    static std::vector<Index> feature_rows(const std::vector<std::size_t>& rows, std::size_t stride) {
+        std::vector<Index> kept = problem_rows(rows, stride);
+        for (Index& row : kept) row /= static_cast<Index>(stride);
+        return kept;
+    }
+
     TubeSolver solver_;
     Eigen::MatrixXd held_out_;
-    Eigen::VectorXd held_out_targets_;
+    VectorXd held_out_targets_;
 };
 
-/// A C at the sigma in hand, after its first fold.
+/// A C at the sigma in hand, after a rough fit of its first fold.
 struct Candidate {
     std::size_t C_index = 0;
-    double rough_mse = 0.0;  ///< of the first fold, at rough_smoothing
-    TubeSolver::State state;
+    double rough_mse = 0.0;
+    TubeSolver::State rough_state;
 };
 
 /// A rough first fold so far above the bound that the fine one is above it, too. The margins are many times
@@ -76,7 +94,7 @@ struct Candidate {
 /// on many windows).
 bool is_out_of_the_running(double rough_mse, std::size_t folds, double bound) {
     const double rough_rmse = std::sqrt(rough_mse / static_cast<double>(folds));
-    return rough_rmse > 1.5 * std::sqrt(bound) + rough_smoothing;
+    return rough_rmse > 4 * std::sqrt(bound) + rough_smoothing;
 }
 
 /// Cross-validation of every C at one sigma.
@@ -84,39 +102,43 @@ class SigmaColumn {
   public:
     SigmaColumn(const LagProblem& problem, double sigma, const std::vector<Fold>& folds,
                 const SweepOptions& options)
-        : folds_(folds),
+        : problem_(problem),
+          sigma_(sigma),
+          folds_(folds),
           options_(options),
-          targets_(Eigen::Map<const Eigen::VectorXd>(problem.targets().data(),
-                                                     static_cast<Eigen::Index>(problem.rows()))),
-          kernel_(
-              kernel_features(problem, sigma, cross_validation_tolerance_factor * feature_tolerance(sigma))),
+          targets_(Eigen::Map<const VectorXd>(problem.targets().data(), static_cast<Index>(problem.rows()))),
           fits_(folds.size()) {}
 
-    /// The first fold along C, each from the one before. Ends where a larger C changes nothing any more.
-    Result<std::vector<Candidate>> first_fold(const Cancelled& cancelled) {
-        std::vector<Candidate> candidates;
-        FoldFits& fold = fits(0);
+    /// The first fold along C, each from the one before.
+    Result<std::vector<Candidate>> look_for_candidates(const Cancelled& cancelled) {
+        const std::size_t stride = std::max<std::size_t>(1, problem_.rows() / rough_rows);
+        rough_ =
+            kernel_features(problem_, sigma_, rough_tolerance_factor * feature_tolerance(sigma_), stride);
+        FoldFits fold(rough_, folds_[0], targets_, options_.epsilon);
         TubeSolver::State state = fold.solver().cold_start();
+        std::vector<Candidate> candidates;
         for (std::size_t k = 0; k < options_.C_grid.size(); ++k) {
             if (cancelled()) return sweep_cancelled();
+            // Once no row is held back by C, a larger one changes nothing.
             if (k > 0 && fold.solver().is_free_of_C()) {
-                candidates.push_back({k, candidates.back().rough_mse, candidates.back().state});
+                candidates.push_back({k, candidates.back().rough_mse, state});
                 continue;
             }
-            const double mse = fold.mse(options_.C_grid[k], state, k == 0 ? cold : along_C);
+            const double C = options_.C_grid[k] * static_cast<double>(stride);
+            const double mse = fold.mse(C, state, k == 0 ? cold : along_C);
             state = fold.solver().state();
             candidates.push_back({k, mse, state});
         }
         return candidates;
     }
 
-    /// The mean over folds, or nothing as soon as it is sure to be above `bound`.
+    /// The mean over folds, or nothing as soon as it is sure to be above `bound`: every fold only adds to it.
     Result<std::optional<double>> mean_mse(const Candidate& candidate, double bound,
                                            const Cancelled& cancelled) {
-        const auto count = static_cast<double>(folds_.size());
         if (is_out_of_the_running(candidate.rough_mse, folds_.size(), bound)) return std::nullopt;
         const double C = options_.C_grid[candidate.C_index];
-        double sum = fits(0).mse(C, candidate.state, refine);
+        const auto count = static_cast<double>(folds_.size());
+        double sum = fits(0).mse(C, on_all_rows(candidate.rough_state), refine);
         const TubeSolver::State first = fits(0).solver().state();
         for (std::size_t f = 1; f < folds_.size(); ++f) {
             if (sum / count > bound) return std::nullopt;
@@ -127,15 +149,28 @@ class SigmaColumn {
     }
 
   private:
+    const KernelFeatures& kernel() {
+        if (!kernel_)
+            kernel_ = kernel_features(problem_, sigma_, fine_tolerance_factor * feature_tolerance(sigma_));
+        return *kernel_;
+    }
+
     FoldFits& fits(std::size_t f) {
-        if (!fits_[f]) fits_[f].emplace(kernel_, folds_[f], targets_, options_.epsilon);
+        if (!fits_[f]) fits_[f].emplace(kernel(), folds_[f], targets_, options_.epsilon);
         return *fits_[f];
     }
 
+    TubeSolver::State on_all_rows(const TubeSolver::State& rough) {
+        return {weights_of(kernel(), rough_.pivots, pivot_coefficients(rough_, rough.weights)), rough.bias};
+    }
+
+    const LagProblem& problem_;
+    double sigma_;
     const std::vector<Fold>& folds_;
     const SweepOptions& options_;
-    Eigen::VectorXd targets_;
-    KernelFeatures kernel_;
+    VectorXd targets_;
+    KernelFeatures rough_;
+    std::optional<KernelFeatures> kernel_;
     std::vector<std::optional<FoldFits>> fits_;
 };
 
@@ -152,7 +187,7 @@ struct Best {
 
 Result<void> search_column(SigmaColumn& column, std::size_t sigma_index, Best& best,
                            const Cancelled& cancelled) {
-    auto candidates = column.first_fold(cancelled);
+    auto candidates = column.look_for_candidates(cancelled);
     if (!candidates) return std::unexpected(candidates.error());
     std::ranges::stable_sort(*candidates, {}, &Candidate::rough_mse);
     for (const Candidate& candidate : *candidates) {
@@ -186,7 +221,7 @@ Result<std::vector<double>> cross_validate_low_rank(const LagProblem& problem, c
     std::vector<double> all;
     for (const double sigma : options.sigma_grid) {
         SigmaColumn column(problem, sigma, folds, options);
-        const auto candidates = column.first_fold(cancelled);
+        const auto candidates = column.look_for_candidates(cancelled);
         if (!candidates) return std::unexpected(candidates.error());
         for (const Candidate& candidate : *candidates) {
             const auto mse = column.mean_mse(candidate, std::numeric_limits<double>::infinity(), cancelled);
@@ -200,8 +235,8 @@ Result<std::vector<double>> cross_validate_low_rank(const LagProblem& problem, c
 Result<SvrModel> fit_model_low_rank(const LagProblem& problem, double C, double sigma,
                                     const SweepOptions& options) {
     const KernelFeatures kernel = kernel_features(problem, sigma, 0.1 * feature_tolerance(sigma));
-    const Eigen::Map<const Eigen::VectorXd> targets(problem.targets().data(),
-                                                    static_cast<Eigen::Index>(problem.rows()));
+    const Eigen::Map<const VectorXd> targets(problem.targets().data(),
+                                             static_cast<Eigen::Index>(problem.rows()));
     TubeSolver solver(kernel.features, targets, options.epsilon);
     if (!solver.fit(C, solver.cold_start(), exact)) {
         return fail(NextStep::stop,

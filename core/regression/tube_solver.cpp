@@ -37,6 +37,9 @@ bool TubeSolver::fit(double C, const State& start, const Schedule& schedule) {
                                    static_cast<std::size_t>(features_.cols()), state_.weights.data(),
                                    state_.bias, residuals_.data());
     residuals_ = targets_ - residuals_;
+    // Rows that C holds back stay held back: their slopes grow with it.
+    slopes_ *= C / tube_.C;
+    slope_sum_ *= C / tube_.C;
     tube_.C = C;
     tube_.epsilon = epsilon_;
     double smoothing = std::max(schedule.first_smoothing, schedule.last_smoothing);
@@ -53,7 +56,6 @@ bool TubeSolver::fit(double C, const State& start, const Schedule& schedule) {
 /// Newton steps at one smoothing, until one moves no prediction by more than `still`.
 bool TubeSolver::descend(double smoothing, double still, int most_steps) {
     tube_.smoothing = smoothing;
-    slope_sum_is_fresh_ = false;
     for (int step = 0; step < most_steps; ++step) {
         ++newton_steps_;
         take_slopes();
@@ -78,11 +80,6 @@ bool TubeSolver::descend(double smoothing, double still, int most_steps) {
 void TubeSolver::take_slopes() {
     vector_loops::loss_slopes(residuals_.data(), static_cast<std::size_t>(residuals_.size()), tube_,
                               new_slopes_.data());
-    if (!slope_sum_is_fresh_) {
-        slope_sum_.setZero();
-        slopes_.setZero();
-        slope_sum_is_fresh_ = true;
-    }
     bending_.clear();
     for (Index i = 0; i < slopes_.size(); ++i) {
         const double slope = new_slopes_(i);

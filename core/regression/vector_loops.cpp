@@ -93,14 +93,14 @@ void add_outer_products(const double* __restrict vectors, std::size_t length, st
 }
 
 THERMBAL_EVERY_WIDTH
-void squared_distances_to(const double* __restrict series, std::size_t rows, const double* __restrict point,
+void squared_distances_to(const double* const* lagged, std::size_t rows, const double* __restrict point,
                           std::size_t lags, double* __restrict distance) {
     for (std::size_t i = 0; i < rows; ++i) distance[i] = 0.0;
     for (std::size_t l = 0; l < lags; ++l) {
         const double at = point[l];
-        const double* lagged = series + l;
+        const double* column = lagged[l];
         for (std::size_t i = 0; i < rows; ++i) {
-            const double difference = lagged[i] - at;
+            const double difference = column[i] - at;
             distance[i] += difference * difference;
         }
     }

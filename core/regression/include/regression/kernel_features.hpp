@@ -10,17 +10,20 @@
 
 namespace thermbal {
 
-/// A Gaussian kernel matrix of low rank: kernel(i, j) = features.row(i) . features.row(j), up to the
+/// Every stride-th row of a problem (features.row(k) belongs to row k * stride) under
+/// a Gaussian kernel matrix of low rank: kernel(i, j) = features.row(i) . features.row(j), up to the
 /// tolerance it was made with. The lagged rows of a filtered warm-up lie close to a smooth curve, so that 5
 /// to 50 features do for 1600 rows.
 struct KernelFeatures {
-    Eigen::MatrixXd features;         ///< rows x rank
-    std::vector<std::size_t> pivots;  ///< the rank rows whose kernel functions the features span
+    Eigen::MatrixXd features;         ///< rows / stride, rounded up, x rank
+    std::vector<std::size_t> pivots;  ///< the rows (of the problem) whose kernel functions the features span
+    std::size_t stride = 1;
 };
 
 /// Cholesky's factorisation with diagonal pivoting (Fine & Scheinberg 2001), until no diagonal element is off
 /// by more than `tolerance`; a function with weights c is then off by at most tolerance * |c|_1.
-KernelFeatures kernel_features(const LagProblem& problem, double sigma, double tolerance);
+KernelFeatures kernel_features(const LagProblem& problem, double sigma, double tolerance,
+                               std::size_t stride = 1);
 
 /// The tolerance at which a fit is off by less than about 5e-6 on the [0, 1] scale: wide kernels carry large
 /// coefficients, so theirs is smaller (measured: |c|_1 stays below 250 sigma^2).
@@ -28,5 +31,10 @@ double feature_tolerance(double sigma);
 
 /// c with sum_k c_k k(x_pivot_k, x) = weights . features(x).
 std::vector<double> pivot_coefficients(const KernelFeatures& kernel, const Eigen::VectorXd& weights);
+
+/// The weights on `features` of the function that has these coefficients at these rows: `features` must hold
+/// those rows.
+Eigen::VectorXd weights_of(const KernelFeatures& features, const std::vector<std::size_t>& rows,
+                           const std::vector<double>& coefficients);
 
 }  // namespace thermbal

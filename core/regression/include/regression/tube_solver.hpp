@@ -67,8 +67,7 @@ class TubeSolver {
     State state_;
     Eigen::VectorXd residuals_;
     Eigen::VectorXd slopes_, new_slopes_;
-    Eigen::VectorXd slope_sum_;  ///< sum of slopes_(i) * row i
-    bool slope_sum_is_fresh_ = false;
+    Eigen::VectorXd slope_sum_;          ///< sum of slopes_(i) * row i
     std::vector<Eigen::Index> bending_;  ///< rows where the loss is quadratic
     Eigen::MatrixXd bent_;               ///< their features, one column a row
     Eigen::MatrixXd square_;             ///< of the Newton system

@@ -15,9 +15,9 @@ void multiply_columns(const double* matrix, std::size_t rows, std::size_t column
 void subtract_columns(const double* matrix, std::size_t rows, std::size_t columns, const double* factor,
                       double* out);
 
-/// distance[i] = sum over l < lags of (series[i + l] - point[l])^2, for i < rows.
-void squared_distances_to(const double* series, std::size_t rows, const double* point, std::size_t lags,
-                          double* distance);
+/// distance[i] = sum over l < lags of (lagged[l][i] - point[l])^2, for i < rows.
+void squared_distances_to(const double* const* lagged, std::size_t rows, const double* point,
+                          std::size_t lags, double* distance);
 
 /// values[i] = exp(factor * values[i]); factor * values[i] must lie in [-700, 0]. Error below 2e-16.
 void scaled_exp(double* values, std::size_t count, double factor);
