@@ -1,9 +1,9 @@
 #include "modes/archive.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include <fmt/format.h>
 
 #include "generic_prior.hpp"
 
@@ -12,7 +12,8 @@ namespace thermbal {
 namespace {
 
 /// Cumulative share of the modes' variance along the grid.
-std::vector<double> cumulative_variance(const std::vector<double>& density, const std::vector<double>& log_variance) {
+std::vector<double> cumulative_variance(const std::vector<double>& density,
+                                        const std::vector<double>& log_variance) {
     std::vector<double> cumulative(density.size(), 0.0);
     double sum = 0.0;
     for (std::size_t g = 0; g < density.size(); ++g) {
@@ -31,29 +32,79 @@ double distance_between(const std::vector<double>& first, const std::vector<doub
     return area;
 }
 
-double log_spacing(const std::vector<double>& grid) { return std::log(grid[1] / grid[0]); }
+double log_spacing(const std::vector<double>& grid) {
+    return std::log(grid[1] / grid[0]);
+}
+
+/// A channel's responses in all tests that have it: their mean first, then the differences from it.
+std::optional<SpectrumPrior::Response> learn_response(const std::vector<ArchivedSpectrum>& tests,
+                                                      const std::string& channel, double least_rise_C) {
+    std::vector<std::vector<double>> shapes;
+    for (const ArchivedSpectrum& test : tests) {
+        for (const ArchivedSpectrum::Response& response : test.responses) {
+            if (response.channel != channel || std::abs(response.rise_C) < least_rise_C) continue;
+            double settled = 0.0;
+            for (const double amplitude : response.amplitude_C) settled += amplitude;
+            if (std::abs(settled) < 0.5 * least_rise_C) continue;
+            shapes.push_back(response.amplitude_C);
+            for (double& amplitude : shapes.back()) amplitude /= settled;
+        }
+    }
+    if (shapes.empty()) return std::nullopt;
+    std::vector<double> mean(shapes.front().size(), 0.0);
+    for (const std::vector<double>& shape : shapes) {
+        if (shape.size() != mean.size()) return std::nullopt;
+        for (std::size_t g = 0; g < mean.size(); ++g)
+            mean[g] += shape[g] / static_cast<double>(shapes.size());
+    }
+    SpectrumPrior::Response response{channel, {mean}};
+    if (shapes.size() < 2) return response;
+    for (std::vector<double>& shape : shapes) {
+        for (std::size_t g = 0; g < mean.size(); ++g) shape[g] -= mean[g];
+        response.shape.push_back(std::move(shape));
+    }
+    return response;
+}
 
 }  // namespace
 
 ArchivedSpectrum archived(const SpectrumEstimate& complete_test) {
-    return {complete_test.time_constant_min, complete_test.mode_density, complete_test.mode_log_variance};
+    ArchivedSpectrum spectrum;
+    spectrum.time_constant_min = complete_test.time_constant_min;
+    spectrum.mode_density = complete_test.mode_density;
+    spectrum.mode_log_variance = complete_test.mode_log_variance;
+    const auto background = static_cast<std::ptrdiff_t>(complete_test.background_time_constant_min.size());
+    const std::ptrdiff_t ambient = complete_test.has_ambient ? background : 0;
+    for (const ChannelEstimate& channel : complete_test.channels) {
+        ArchivedSpectrum::Response response{channel.channel, channel.rise_C, {}};
+        const auto first = channel.coefficients.begin() + 1;
+        response.amplitude_C.assign(first, first + background);
+        response.amplitude_C.insert(response.amplitude_C.end(), first + background + ambient,
+                                    channel.coefficients.end());
+        spectrum.responses.push_back(std::move(response));
+    }
+    return spectrum;
 }
 
 Result<SpectrumPrior> learn_prior(const std::vector<ArchivedSpectrum>& tests, const SpectrumOptions& spectrum,
                                   const ArchiveOptions& options) {
     if (tests.size() < std::max<std::size_t>(1, options.tests_for_trust)) {
-        return fail(NextStep::refuse_input, fmt::format("{} earlier tests are not enough to learn from", tests.size()));
+        return fail(NextStep::refuse_input,
+                    fmt::format("{} earlier tests are not enough to learn from", tests.size()));
     }
     const GenericPrior generic = generic_prior(spectrum);
     const std::size_t points = generic.time_constant_min.size();
     for (const ArchivedSpectrum& test : tests) {
-        const bool fits = test.time_constant_min.size() == points && test.mode_density.size() == points &&
-                          test.mode_log_variance.size() == points &&
-                          std::abs(test.time_constant_min.back() / generic.time_constant_min.back() - 1.0) < 1e-6;
+        const bool fits =
+            test.time_constant_min.size() == points && test.mode_density.size() == points &&
+            test.mode_log_variance.size() == points &&
+            std::abs(test.time_constant_min.back() / generic.time_constant_min.back() - 1.0) < 1e-6;
         if (!fits) {
-            return fail(NextStep::refuse_input,
-                        fmt::format("a stored spectrum has {} time constants, {} are expected: identify that test again",
-                                    test.time_constant_min.size(), points));
+            return fail(
+                NextStep::refuse_input,
+                fmt::format(
+                    "a stored spectrum has {} time constants, {} are expected: identify that test again",
+                    test.time_constant_min.size(), points));
         }
     }
     const double spacing = log_spacing(generic.time_constant_min);
@@ -87,11 +138,18 @@ Result<SpectrumPrior> learn_prior(const std::vector<ArchivedSpectrum>& tests, co
         prior.log_variance_mean.push_back(mean);
         prior.log_variance_sd.push_back(std::max(options.log_variance_sd_least, spread));
     }
+    if (!options.use_responses) return prior;
+    for (const ArchivedSpectrum::Response& response : tests.front().responses) {
+        std::optional<SpectrumPrior::Response> learnt =
+            learn_response(tests, response.channel, options.least_rise_C);
+        if (learnt) prior.responses.push_back(std::move(*learnt));
+    }
     return prior;
 }
 
-Contradiction compare_with_archive(const SpectrumEstimate& current, const std::vector<ArchivedSpectrum>& tests,
-                                   double trusted_after, double least_distance) {
+Contradiction compare_with_archive(const SpectrumEstimate& current,
+                                   const std::vector<ArchivedSpectrum>& tests, double trusted_after,
+                                   double least_distance) {
     Contradiction result;
     if (tests.empty() || current.time_constant_min.size() < 2) return result;
     const double spacing = log_spacing(current.time_constant_min);
@@ -106,7 +164,8 @@ Contradiction compare_with_archive(const SpectrumEstimate& current, const std::v
     for (std::size_t a = 0; a < before.size(); ++a) {
         result.distance = std::min(result.distance, distance_between(now, before[a], spacing));
         for (std::size_t b = a + 1; b < before.size(); ++b) {
-            result.usual_distance = std::max(result.usual_distance, distance_between(before[a], before[b], spacing));
+            result.usual_distance =
+                std::max(result.usual_distance, distance_between(before[a], before[b], spacing));
         }
     }
     const double span_min = (current.window_end_s - current.window_start_s) / 60.0;
@@ -114,7 +173,8 @@ Contradiction compare_with_archive(const SpectrumEstimate& current, const std::v
     const double allowed = std::max(least_distance, 1.5 * result.usual_distance);
     result.contradicted = trusted && result.distance > allowed;
     result.reason = fmt::format(
-        "the spectrum of time constants lies {:.2f} (in log tau) from the nearest of {} earlier tests, {:.2f} is allowed{}",
+        "the spectrum of time constants lies {:.2f} (in log tau) from the nearest of {} earlier tests, "
+        "{:.2f} is allowed{}",
         result.distance, before.size(), allowed,
         result.contradicted ? ": the machine is not the one of the archive, its prior is dropped"
         : trusted           ? ""

@@ -8,31 +8,47 @@
 namespace thermbal {
 
 ChannelModel::ChannelModel(const ReducedChannel& channel, const Basis& basis, const BackgroundPrior& prior,
-                           double scale, const Eigen::VectorXd& functional)
-    : functional_(functional), scale_squared_(scale * scale) {
+                           double scale, double mode_scale, const Eigen::VectorXd& functional)
+    : scale_squared_(mode_scale * mode_scale) {
+    constexpr double free_scale = 10.0;
+    constexpr double difference_scale = 1.5;
     const Eigen::Index count = channel.rotated.size();
     const Eigen::Index extra = basis.has_ambient ? 1 : 0;
-    rows_ = Eigen::MatrixXd::Zero(count + extra, basis.size());
-    rows_.topRows(count) = channel.reduced;
+    const Eigen::Index responses = prior.responses.cols();
+    const Eigen::Index columns = basis.size() + responses;
+    rows_ = Eigen::MatrixXd::Zero(count + extra, columns);
+    rows_.topLeftCorner(count, basis.size()) = channel.reduced;
+    functional_ = Eigen::VectorXd::Zero(columns);
+    functional_.head(basis.size()) = functional;
     fine_ = Eigen::MatrixXd::Zero(count + extra, channel.reduced_fine.cols());
     fine_.topRows(count) = channel.reduced_fine;
+    if (responses > 0) {
+        rows_.block(0, basis.size(), count, responses) =
+            channel.reduced.middleCols(1, basis.grid()) * prior.responses.topRows(basis.grid()) +
+            channel.reduced_fine * prior.responses.bottomRows(channel.reduced_fine.cols());
+        functional_.tail(responses) = prior.responses.colwise().sum().transpose();
+    }
     value_ = Eigen::VectorXd::Zero(count + extra);
     value_.head(count) = channel.rotated;
     noise_variance_ =
         Eigen::VectorXd::Constant(count + extra, channel.sample_variance * channel.variance_inflation);
-    prior_mean_ = Eigen::VectorXd::Zero(basis.size());
-    prior_variance_ = Eigen::VectorXd::Zero(basis.size());
+    prior_mean_ = Eigen::VectorXd::Zero(columns);
+    prior_variance_ = Eigen::VectorXd::Zero(columns);
+    for (Eigen::Index k = 0; k < responses; ++k) {
+        const double sd = (k == 0 ? free_scale : difference_scale) * scale;
+        prior_variance_[basis.size() + k] = sd * sd;
+    }
     const double reach = 10.0 * (channel.range_C + 1.0);
     prior_variance_[0] = reach * reach;
     prior_variance_.segment(1, basis.grid()) = scale_squared_ * prior.level_profile;
     if (basis.has_ambient) {
         // In the end the channel follows the room: the gains' sum is one more observation.
-        rows_.row(count).tail(basis.grid()).setOnes();
+        rows_.row(count).segment(1 + basis.grid(), basis.grid()).setOnes();
         const double loss = prior.ambient_gain_loss_per_C * channel.range_C;
         value_[count] = 1.0 - loss;
         noise_variance_[count] = prior.ambient_gain_sd * prior.ambient_gain_sd + loss * loss;
-        prior_mean_.tail(basis.grid()) = prior.ambient_mean;
-        prior_variance_.tail(basis.grid()) = prior.ambient_variance;
+        prior_mean_.segment(1 + basis.grid(), basis.grid()) = prior.ambient_mean;
+        prior_variance_.segment(1 + basis.grid(), basis.grid()) = prior.ambient_variance;
     }
     background_covariance_ = rows_ * prior_variance_.asDiagonal() * rows_.transpose();
     background_covariance_.diagonal() += noise_variance_;
@@ -80,7 +96,17 @@ ConditionalValue ChannelModel::steady_state() const {
     const Eigen::VectorXd cross = cross_ + columns_ * mode_variance_;
     const Eigen::VectorXd half = factor_.triangularView<Eigen::Lower>().solve(cross);
     const double prior_variance = functional_variance_ + mode_variance_.sum();
-    return {functional_mean_ + mode_mean_.sum() + cross.dot(dual_), std::max(0.0, prior_variance - half.squaredNorm())};
+    return {functional_mean_ + mode_mean_.sum() + cross.dot(dual_),
+            std::max(0.0, prior_variance - half.squaredNorm())};
+}
+
+double ChannelModel::settled(const Eigen::VectorXd& sample) const {
+    return functional_.dot(sample.head(functional_.size())) +
+           sample.tail(sample.size() - functional_.size()).sum();
+}
+
+double ChannelModel::chi_square() const {
+    return left_.dot(dual_) / static_cast<double>(left_.size());
 }
 
 Eigen::VectorXd ChannelModel::mean_background() const {

@@ -18,6 +18,9 @@ struct BackgroundPrior {
         level_profile;  ///< of the background, per time constant of the basis, relative to scale squared
     Eigen::VectorXd ambient_mean;  ///< empty without an ambient
     Eigen::VectorXd ambient_variance;
+    /// Archived responses of the channel, one a column, on the background's grid and then the modes'; empty
+    /// without. The first is the mean (settling at 1), the others differences from it (settling near 0).
+    Eigen::MatrixXd responses;
     double ambient_gain_loss_per_C = 0.0;
     double ambient_gain_sd = 0.05;
 };
@@ -31,20 +34,25 @@ struct ConditionalValue {
 /// One channel's Gaussian model in the rotated frame of its samples.
 class ChannelModel {
   public:
+    /// `scale` is what the channel moves, `mode_scale` what its modes carry of it (less, with archived
+    /// responses).
     ChannelModel(const ReducedChannel& channel, const Basis& basis, const BackgroundPrior& prior,
-                 double scale, const Eigen::VectorXd& functional);
+                 double scale, double mode_scale, const Eigen::VectorXd& functional);
 
     /// What the mode sampler needs.
     WhitenedChannel whitened(double direction) const;
 
-    /// Sets the modes everything below is conditional on: rotated step columns and the prior of the amplitudes.
+    /// Sets the modes everything below is conditional on: rotated step columns and the prior of the
+    /// amplitudes.
     void condition_on(const Eigen::MatrixXd& columns, const ModeAmplitudes& amplitudes);
 
     Eigen::MatrixXd columns_at(const std::vector<Mode>& modes) const;
     ConditionalValue steady_state() const;
-    Eigen::VectorXd mean_background() const;  ///< coefficients of the basis
+    Eigen::VectorXd mean_background() const;  ///< coefficients of the basis, then of the archived responses
     Eigen::VectorXd mean_modes() const;       ///< amplitudes of the modes
-    /// One draw of all coefficients, basis first, by Matheron's rule.
+    double settled(const Eigen::VectorXd& sample) const;  ///< steady state of a draw
+    double chi_square() const;                            ///< of the reduced samples, a degree of freedom
+    /// One draw of all coefficients (basis, archived responses, modes) by Matheron's rule.
     Eigen::VectorXd draw(Random& random) const;
 
   private:

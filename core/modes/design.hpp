@@ -74,7 +74,7 @@ struct ReducedChannel {
     double sample_variance = 0.0;     ///< of one sample about the best fit, floored by the resolution
     double variance_inflation = 1.0;  ///< integrated autocorrelation of the residuals
     double residual_rms_C = 0.0;      ///< of block means
-    double change_C = 0.0;             ///< last block means less first
+    double change_C = 0.0;            ///< last block means less first
     double range_C = 0.0;             ///< of block means, first to last tenth and extremes
     double resolution_C = 0.0;
     std::size_t good_samples = 0;

@@ -6,8 +6,8 @@
 
 namespace thermbal {
 
-/// The modes of a machine never seen before, on the grid of `options`: even on the logarithm of the time constant, rarer
-/// beyond the fall-off.
+/// The modes of a machine never seen before, on the grid of `options`: even on the logarithm of the time
+/// constant, rarer beyond the fall-off.
 struct GenericPrior {
     std::vector<double> time_constant_min;
     std::vector<double> intensity;

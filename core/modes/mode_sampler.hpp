@@ -17,7 +17,8 @@ struct ModePrior {
     Eigen::VectorXd intensity;
     Eigen::VectorXd log_variance_mean;
     Eigen::VectorXd log_variance_sd;
-    Eigen::VectorXd same_sign;  ///< share of a mode's amplitude, rms over channels, that has the machine's direction
+    Eigen::VectorXd
+        same_sign;  ///< share of a mode's amplitude, rms over channels, that has the machine's direction
     std::size_t most_modes = 14;
 };
 

@@ -225,6 +225,21 @@ double common_direction(const std::vector<ReducedChannel>& channels, const std::
     return std::copysign(std::max(0.0, (agreement - disagreement) / (1.0 - disagreement)), net);
 }
 
+Eigen::MatrixXd archived_responses(const std::optional<SpectrumPrior>& prior, const std::string& channel) {
+    if (!prior) return {};
+    for (const SpectrumPrior::Response& response : prior->responses) {
+        if (response.channel != channel || response.shape.empty()) continue;
+        Eigen::MatrixXd columns(static_cast<Eigen::Index>(response.shape.front().size()),
+                                static_cast<Eigen::Index>(response.shape.size()));
+        for (std::size_t k = 0; k < response.shape.size(); ++k) {
+            columns.col(static_cast<Eigen::Index>(k)) = Eigen::Map<const Eigen::VectorXd>(
+                response.shape[k].data(), static_cast<Eigen::Index>(response.shape[k].size()));
+        }
+        return columns;
+    }
+    return {};
+}
+
 /// Spreads one value a mode over the two grid points about each mode.
 void add_on_grid(const std::vector<Mode>& modes, const Eigen::VectorXd& value, double factor,
                  Eigen::VectorXd& grid) {
@@ -326,15 +341,23 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
     // A sensor far from the heat is flat at first because its modes cancel, not because they are small.
     const double common = options.scale_floor * median(ranges);
     const Eigen::VectorXd functional = steady_state_functional(basis, room);
-    const BackgroundPrior background = background_prior(basis, options);
+    BackgroundPrior background = background_prior(basis, options);
     const ModePrior modes_prior = mode_prior(prior, options);
     const double direction = common_direction(reduced, used);
     std::vector<ChannelModel> models;
     std::vector<WhitenedChannel> whitened;
+    std::vector<Eigen::MatrixXd> responses;
     for (const std::size_t i : used) {
         const double scale = std::sqrt(reduced[i].range_C * reduced[i].range_C + common * common +
                                        9.0 * reduced[i].sample_variance);
-        models.emplace_back(reduced[i], basis, background, scale, functional);
+        // After a regime change the channels start out of equilibrium: what they did from cold does not
+        // apply.
+        background.responses = start_level_C.empty()
+                                   ? archived_responses(prior, window.channels[structural[i]].name)
+                                   : Eigen::MatrixXd();
+        const double mode_scale = background.responses.cols() > 0 ? options.archive_deviation * scale : scale;
+        models.emplace_back(reduced[i], basis, background, scale, mode_scale, functional);
+        responses.push_back(background.responses);
         whitened.push_back(models.back().whitened(direction));
     }
     const std::vector<std::vector<Mode>> states =
@@ -343,10 +366,19 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
 
     Random random(seed ^ 0x5DEECE66DULL);
     std::vector<ChannelDraws> draws(used.size());
-    for (ChannelDraws& each : draws) {
-        each.background = Eigen::VectorXd::Zero(basis.size());
-        each.fine = Eigen::VectorXd::Zero(modes_prior.log_tau.size());
+    std::vector<Eigen::MatrixXd> linear_curves(used.size());  // of basis and archived responses
+    for (std::size_t k = 0; k < used.size(); ++k) {
+        const Eigen::Index columns = basis.size() + responses[k].cols();
+        draws[k].background = Eigen::VectorXd::Zero(columns);
+        draws[k].fine = Eigen::VectorXd::Zero(modes_prior.log_tau.size());
+        linear_curves[k].resize(curves.design.rows(), columns);
+        linear_curves[k].leftCols(basis.size()) = curves.design;
+        if (responses[k].cols() == 0) continue;
+        linear_curves[k].rightCols(responses[k].cols()) =
+            curves.design.middleCols(1, basis.grid()) * responses[k].topRows(basis.grid()) +
+            curves.fine * responses[k].bottomRows(curves.fine.cols());
     }
+    double chi_square = 0.0;
     Eigen::VectorXd density = Eigen::VectorXd::Zero(modes_prior.log_tau.size());
     Eigen::VectorXd log_variance = Eigen::VectorXd::Zero(modes_prior.log_tau.size());
     const double share = 1.0 / static_cast<double>(states.size());
@@ -369,14 +401,14 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
             const ConditionalValue value = model.steady_state();
             draws[k].mean.push_back(value.mean);
             draws[k].variance.push_back(value.variance);
+            chi_square += share * model.chi_square() / static_cast<double>(used.size());
             draws[k].background += share * model.mean_background();
             add_on_grid(modes, model.mean_modes(), share, draws[k].fine);
             if (!with_curve) continue;
             const Eigen::VectorXd sample = model.draw(random);
-            const Eigen::VectorXd curve =
-                curves.design * sample.head(basis.size()) + steps * sample.tail(count);
-            const double settled =
-                functional.dot(sample.head(basis.size())) + sample.tail(count).sum();
+            const Eigen::Index linear = linear_curves[k].cols();
+            const Eigen::VectorXd curve = linear_curves[k] * sample.head(linear) + steps * sample.tail(count);
+            const double settled = model.settled(sample);
             const double given = start_level_C.empty()
                                      ? no_value
                                      : start_level_C[structural[used[k]]] - reduced[used[k]].centre_C;
@@ -395,6 +427,7 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
                                                               : modes_prior.log_variance_mean[g]);
     }
     estimate.expected_modes = density.sum();
+    estimate.chi_square = chi_square;
     estimate.window_start_s = window.start_s;
     estimate.window_end_s = window.end_s();
     estimate.ambient_reference_C = room.reference_C;
@@ -427,10 +460,16 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
             data.centre_C + mixture_quantile(channel_draws, options.interval_widening, 0.05);
         channel.steady_state_high_C =
             data.centre_C + mixture_quantile(channel_draws, options.interval_widening, 0.95);
-        Eigen::VectorXd coefficients(basis.size() + channel_draws.fine.size());
-        coefficients << channel_draws.background, channel_draws.fine;
         const Eigen::VectorXd curve =
-            curves.design * channel_draws.background + curves.fine * channel_draws.fine;
+            linear_curves[k] * channel_draws.background + curves.fine * channel_draws.fine;
+        Eigen::VectorXd coefficients(basis.size() + channel_draws.fine.size());
+        coefficients << channel_draws.background.head(basis.size()), channel_draws.fine;
+        if (responses[k].cols() > 0) {
+            const Eigen::VectorXd response =
+                responses[k] * channel_draws.background.tail(responses[k].cols());
+            coefficients.segment(1, basis.grid()) += response.head(basis.grid());
+            coefficients.tail(channel_draws.fine.size()) += response.tail(channel_draws.fine.size());
+        }
         coefficients[0] += data.centre_C;
         channel.coefficients.assign(coefficients.begin(), coefficients.end());
         channel.start_C = coefficients[0];
@@ -443,7 +482,7 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
             start_min + crossing_time(curves.minute, curve, start_level - data.centre_C, mean);
         channel.equilibrium_low_min = std::min(sorted_quantile(times, 0.05), channel.equilibrium_time_min);
         channel.equilibrium_high_min = std::max(sorted_quantile(times, 0.95), channel.equilibrium_time_min);
-        const Eigen::VectorXd& own = channel_draws.fine;
+        const Eigen::VectorXd own = coefficients.tail(channel_draws.fine.size());
         channel.slowest_time_constant_min = slowest_carrying(fine_grid, own);
         amplitudes += own.cwiseAbs();
         estimate.channels.push_back(std::move(channel));

@@ -11,15 +11,25 @@ namespace thermbal {
 
 /// How a prior is learnt from earlier tests of the same machine.
 struct ArchiveOptions {
-    double blur_log_tau = 0.08;       ///< time constants of a test are known, and repeat, to about this (sd of log tau)
-    double generic_share = 0.25;      ///< of the modes may be such as no earlier test had: the first test's prior, thinned
+    double blur_log_tau =
+        0.08;  ///< time constants of a test are known, and repeat, to about this (sd of log tau)
+    double generic_share =
+        0.25;  ///< of the modes may be such as no earlier test had: the first test's prior, thinned
     double log_variance_sd_least = 0.7;
+    double least_rise_C = 0.8;        ///< a channel that rose less leaves no response
+    bool use_responses = true;        ///< off after a warm start: earlier responses are from cold
     std::size_t tests_for_trust = 1;  ///< fewer tests give no prior
 };
 
-/// The modes that a finished test leaves for the archive: what SpectrumEstimate says on its complete window. Plain vectors
-/// of the grid's length, made to be stored.
+/// The modes that a finished test leaves for the archive: what SpectrumEstimate says on its complete window.
+/// Plain vectors of the grid's length, made to be stored.
 struct ArchivedSpectrum {
+    struct Response {
+        std::string channel;
+        double rise_C = 0.0;
+        std::vector<double> amplitude_C;  ///< on the background's grid, then on the modes'
+    };
+    std::vector<Response> responses;
     std::vector<double> time_constant_min;
     std::vector<double> mode_density;
     std::vector<double> mode_log_variance;
@@ -27,24 +37,27 @@ struct ArchivedSpectrum {
 
 ArchivedSpectrum archived(const SpectrumEstimate& complete_test);
 
-/// Learns the prior of the next test: the mean over tests of the modes' density, blurred by what differs between tests,
-/// plus a share of the generic prior of `spectrum`. Between tests that disagree the density spreads by itself.
-/// Errors (refuse_input): no test, or a test on another grid.
+/// Learns the prior of the next test: the mean over tests of the modes' density, blurred by what differs
+/// between tests, plus a share of the generic prior of `spectrum`. Between tests that disagree the density
+/// spreads by itself. Errors (refuse_input): no test, or a test on another grid.
 Result<SpectrumPrior> learn_prior(const std::vector<ArchivedSpectrum>& tests, const SpectrumOptions& spectrum,
                                   const ArchiveOptions& options);
 
-/// Whether a window contradicts the archive: the mean log density that the archive gives to the modes of the window
-/// (estimated without it), against what it gives to the modes of its own tests, each test left out in turn.
+/// Whether a window contradicts the archive: the mean log density that the archive gives to the modes of the
+/// window (estimated without it), against what it gives to the modes of its own tests, each test left out in
+/// turn.
 struct Contradiction {
     bool contradicted = false;
-    double distance = 0.0;          ///< earth mover's distance of the amplitude-weighted spectra, in log tau
-    double usual_distance = 0.0;    ///< the largest between two of the archive's own tests (0 with one test)
-    std::string reason;             ///< one line for a person, with the figures
+    double distance = 0.0;        ///< earth mover's distance of the amplitude-weighted spectra, in log tau
+    double usual_distance = 0.0;  ///< the largest between two of the archive's own tests (0 with one test)
+    std::string reason;           ///< one line for a person, with the figures
 };
 
-/// `current` is the estimate of the window without the archive. The distance compares where on the axis of time constants
-/// the slow half of the amplitudes sits; it is trusted once the window is `trusted_after` slowest time constants long.
-Contradiction compare_with_archive(const SpectrumEstimate& current, const std::vector<ArchivedSpectrum>& tests,
-                                   double trusted_after = 1.2, double least_distance = 0.30);
+/// `current` is the estimate of the window without the archive. The distance compares where on the axis of
+/// time constants the slow half of the amplitudes sits; it is trusted once the window is `trusted_after`
+/// slowest time constants long.
+Contradiction compare_with_archive(const SpectrumEstimate& current,
+                                   const std::vector<ArchivedSpectrum>& tests, double trusted_after = 1.2,
+                                   double least_distance = 0.30);
 
 }  // namespace thermbal

@@ -26,20 +26,25 @@ struct SpectrumOptions {
     double mode_log_variance_mean =
         -3.0;  ///< of a mode's variance relative to the channel's squared scale, natural log
     double mode_log_variance_sd = 2.0;
-    double same_sign = 0.5;      ///< slow modes move all channels the same way: share of their rms amplitude ...
-    double same_sign_min = 30.0; ///< ... reached well above this time constant
+    double same_sign = 0.5;  ///< slow modes move all channels the same way: share of their rms amplitude ...
+    double same_sign_min = 30.0;  ///< ... reached well above this time constant
     double scale_floor = 0.5;  ///< least scale of a channel, as a share of the median range of all channels
 
     std::size_t background_points =
         28;                          ///< grid of the continuous background and of the response to the room
     double background_level = 1e-4;  ///< variance of a background amplitude, relative to the squared scale
 
-    // Friction falls as the machine warms: a channel follows the room the less, the more its own heat raises it.
-    double ambient_gain_loss_per_C = 0.012;  ///< in the end it follows with a gain of 1 less this times its rise so far ...
-    double ambient_gain_sd = 0.02;          ///< ... give or take this and the loss itself
+    // Friction falls as the machine warms: a channel follows the room the less, the more its own heat raises
+    // it.
+    double ambient_gain_loss_per_C =
+        0.012;  ///< in the end it follows with a gain of 1 less this times its rise so far ...
+    double ambient_gain_sd = 0.02;     ///< ... give or take this and the loss itself
     double ambient_centre_min = 60.0;  ///< median time constant of the response to the room, a priori
     double ambient_spread = 1.2;       ///< its spread, sd of log(tau)
     double ambient_tail_min = 15.0;    ///< the ambient stays at its mean over the last so many minutes
+
+    double archive_deviation =
+        0.15;  ///< with archived responses modes only carry what differs: this share of the scale
 
     std::size_t burn_in = 1500;      ///< Metropolis-Hastings steps that are thrown away
     std::size_t draws = 200;         ///< states that are kept
@@ -52,6 +57,14 @@ struct SpectrumOptions {
 /// What earlier tests of the same machine say about its modes, on the grid of time constants: expected number
 /// of modes a cell, and mean and spread of the logarithm of their relative variance. See modes/archive.hpp.
 struct SpectrumPrior {
+    /// How one channel answered the heat in earlier tests, scaled to a rise of 1: amplitudes on the
+    /// background's grid, then on the modes' grid; the mean over tests first, then each test's difference
+    /// from it.
+    struct Response {
+        std::string channel;
+        std::vector<std::vector<double>> shape;
+    };
+    std::vector<Response> responses;
     std::vector<double> time_constant_min;
     std::vector<double> intensity;
     std::vector<double> log_variance_mean;
@@ -97,6 +110,9 @@ struct SpectrumEstimate {
     double slowest_time_constant_min = 0.0;  ///< slowest that carries at least 5 % of all amplitudes
     std::size_t blocks = 0;                  ///< rows the fit saw
     std::vector<double> background_time_constant_min;
+    /// Joint chi-square of the reduced samples a degree of freedom, under the prior: about 1, or below; far
+    /// above 1 if an archive's responses cannot be bent to the samples.
+    double chi_square = 0.0;
 };
 
 /// Estimates where every structural channel of `window` settles from time constants that all of them share.
