@@ -22,14 +22,18 @@ using Eigen::VectorXd;
 /// Where on the grid to look: on every few rows, C made up for them, and not to the last digit.
 constexpr std::size_t rough_rows = 400;
 constexpr double rough_tolerance_factor = 100.0;
-constexpr double rough_smoothing = 3e-4;
-constexpr Schedule cold{.first_smoothing = 0.03, .factor = 0.1, .last_smoothing = rough_smoothing};
-constexpr Schedule along_C{.first_smoothing = 0.03, .factor = 0.1, .last_smoothing = rough_smoothing};
+/// A tenth of the error to beat, as far as that is known.
+double rough_smoothing(double bound) {
+    return std::clamp(0.1 * std::sqrt(bound), 3e-4, 3e-3);
+}
+Schedule rough_schedule(double smoothing) {
+    return {.first_smoothing = 0.03, .factor = 0.1, .last_smoothing = smoothing};
+}
 
 /// What is chosen by: the smoothing moves a prediction by about as much as it is wide.
 constexpr double fine_tolerance_factor = 10.0;
 constexpr double fine_smoothing = 1e-7;
-constexpr Schedule refine{.first_smoothing = 1e-3, .factor = 0.1, .last_smoothing = fine_smoothing};
+constexpr Schedule refine{.first_smoothing = 1e-2, .factor = 0.1, .last_smoothing = fine_smoothing};
 constexpr Schedule across_folds{.first_smoothing = 0.01, .factor = 0.1, .last_smoothing = fine_smoothing};
 
 /// For what the quicker ones did not bring to an end.
@@ -94,7 +98,7 @@ struct Candidate {
 /// on many windows).
 bool is_out_of_the_running(double rough_mse, std::size_t folds, double bound) {
     const double rough_rmse = std::sqrt(rough_mse / static_cast<double>(folds));
-    return rough_rmse > 4 * std::sqrt(bound) + rough_smoothing;
+    return rough_rmse > 4 * std::sqrt(bound) + rough_smoothing(bound);
 }
 
 /// Cross-validation of every C at one sigma.
@@ -110,11 +114,12 @@ class SigmaColumn {
           fits_(folds.size()) {}
 
     /// The first fold along C, each from the one before.
-    Result<std::vector<Candidate>> look_for_candidates(const Cancelled& cancelled) {
+    Result<std::vector<Candidate>> look_for_candidates(double bound, const Cancelled& cancelled) {
         const std::size_t stride = std::max<std::size_t>(1, problem_.rows() / rough_rows);
         rough_ =
             kernel_features(problem_, sigma_, rough_tolerance_factor * feature_tolerance(sigma_), stride);
         FoldFits fold(rough_, folds_[0], targets_, options_.epsilon);
+        const Schedule schedule = rough_schedule(rough_smoothing(bound));
         TubeSolver::State state = fold.solver().cold_start();
         std::vector<Candidate> candidates;
         for (std::size_t k = 0; k < options_.C_grid.size(); ++k) {
@@ -125,7 +130,7 @@ class SigmaColumn {
                 continue;
             }
             const double C = options_.C_grid[k] * static_cast<double>(stride);
-            const double mse = fold.mse(C, state, k == 0 ? cold : along_C);
+            const double mse = fold.mse(C, state, schedule);
             state = fold.solver().state();
             candidates.push_back({k, mse, state});
         }
@@ -187,7 +192,7 @@ struct Best {
 
 Result<void> search_column(SigmaColumn& column, std::size_t sigma_index, Best& best,
                            const Cancelled& cancelled) {
-    auto candidates = column.look_for_candidates(cancelled);
+    auto candidates = column.look_for_candidates(best.mean_mse, cancelled);
     if (!candidates) return std::unexpected(candidates.error());
     std::ranges::stable_sort(*candidates, {}, &Candidate::rough_mse);
     for (const Candidate& candidate : *candidates) {
@@ -221,7 +226,7 @@ Result<std::vector<double>> cross_validate_low_rank(const LagProblem& problem, c
     std::vector<double> all;
     for (const double sigma : options.sigma_grid) {
         SigmaColumn column(problem, sigma, folds, options);
-        const auto candidates = column.look_for_candidates(cancelled);
+        const auto candidates = column.look_for_candidates(0.0, cancelled);
         if (!candidates) return std::unexpected(candidates.error());
         for (const Candidate& candidate : *candidates) {
             const auto mse = column.mean_mse(candidate, std::numeric_limits<double>::infinity(), cancelled);
