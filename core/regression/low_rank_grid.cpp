@@ -39,7 +39,7 @@ constexpr Schedule across_folds{.first_smoothing = 0.01, .factor = 0.1, .last_sm
 /// For what the quicker ones did not bring to an end.
 constexpr Schedule patient{
     .first_smoothing = 0.5, .factor = 0.3, .last_smoothing = fine_smoothing, .most_steps = 1000};
-constexpr Schedule exact{.first_smoothing = 0.5, .factor = 0.1, .last_smoothing = 1e-9, .most_steps = 1000};
+constexpr Schedule exact{.first_smoothing = 0.5, .factor = 0.1, .last_smoothing = 1e-8, .most_steps = 1000};
 
 /// One fold at one sigma: a solver on its training rows, and what is held out; of the rows that the features
 /// have.
@@ -239,7 +239,7 @@ Result<std::vector<double>> cross_validate_low_rank(const LagProblem& problem, c
 
 Result<SvrModel> fit_model_low_rank(const LagProblem& problem, double C, double sigma,
                                     const SweepOptions& options) {
-    const KernelFeatures kernel = kernel_features(problem, sigma, 0.1 * feature_tolerance(sigma));
+    const KernelFeatures kernel = kernel_features(problem, sigma, 0.01 * feature_tolerance(sigma));
     const Eigen::Map<const VectorXd> targets(problem.targets().data(),
                                              static_cast<Eigen::Index>(problem.rows()));
     TubeSolver solver(kernel.features, targets, options.epsilon);

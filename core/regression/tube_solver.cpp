@@ -53,7 +53,7 @@ bool TubeSolver::fit(double C, const State& start, const Schedule& schedule) {
     return converged;
 }
 
-/// Newton steps at one smoothing, until one moves no prediction by more than `still`.
+/// Newton steps at one smoothing, until a full one would move no prediction by more than `still`.
 bool TubeSolver::descend(double smoothing, double still, int most_steps) {
     tube_.smoothing = smoothing;
     for (int step = 0; step < most_steps; ++step) {
@@ -70,7 +70,7 @@ bool TubeSolver::descend(double smoothing, double still, int most_steps) {
         state_.weights += length * direction_;
         state_.bias += length * bias_direction_;
         residuals_ -= length * change_;
-        if (length * change_.lpNorm<Eigen::Infinity>() <= still) return true;
+        if (change_.lpNorm<Eigen::Infinity>() <= still) return true;
     }
     return false;
 }
