@@ -1,0 +1,220 @@
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+
+#include <Eigen/Dense>
+#include <gtest/gtest.h>
+
+#include "../filter/python_peer.hpp"
+#include "filter/gaps.hpp"
+#include "regression/grid_search.hpp"
+#include "regression/kernel.hpp"
+#include "regression/kernel_features.hpp"
+#include "regression/tube_solver.hpp"
+#include "regression/vector_loops.hpp"
+#include "windows.hpp"
+
+namespace thermbal {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::Numbers;
+
+TEST(VectorLoops, ExpIsThatOfTheStandardLibrary) {
+    for (double x = 0.0; x < 690.0; x += 0.0137) {
+        double value = x;
+        vector_loops::scaled_exp(&value, 1, -1.0);
+        ASSERT_NEAR(value / std::exp(-x), 1.0, 4e-16) << x;
+    }
+}
+
+TEST(VectorLoops, DerivativesAreThoseOfTheSmoothedLoss) {
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal(0.0, 0.003);
+    for (const std::size_t count : {1, 7, 8, 9, 100}) {
+        Numbers residual(count), change(count);
+        for (std::size_t i = 0; i < count; ++i) residual[i] = normal(random), change[i] = normal(random);
+        const vector_loops::Tube tube{.C = 3.0, .epsilon = 0.001, .smoothing = 0.002};
+        const double t = 0.4;
+        double first = 0.0, second = 0.0;
+        for (std::size_t i = 0; i < count; ++i) {
+            const double moved = residual[i] - t * change[i];
+            const double over = (std::abs(moved) - tube.epsilon) / tube.smoothing;
+            first += tube.C * std::clamp(over, 0.0, 1.0) * (moved < 0.0 ? -1.0 : 1.0) * change[i];
+            if (over > 0.0 && over < 1.0) second += tube.C / tube.smoothing * change[i] * change[i];
+        }
+        const auto found = vector_loops::derivatives_along(residual.data(), change.data(), t, count, tube);
+        EXPECT_NEAR(found.first, first, 1e-13);
+        EXPECT_NEAR(found.second, second, 1e-10);
+    }
+}
+
+MatrixXd kernel_of(const LagProblem& problem, double sigma) {
+    return gaussian_kernel(squared_distances(problem), sigma);
+}
+
+TEST(KernelFeatures, MultiplyToTheKernel) {
+    const auto window = testing::filtered_warm_up(testing::two_constants, 230, 1);
+    for (const std::size_t lags : {1, 6, 35}) {
+        const auto problem = *make_lag_problem(window, lags, 0.0);
+        for (const double sigma : {0.5, 4.0, 64.0}) {
+            for (const std::size_t stride : {1, 3}) {
+                const auto features = kernel_features(problem, sigma, 1e-9, stride);
+                std::vector<Index> rows;
+                for (std::size_t row = 0; row < problem.rows(); row += stride)
+                    rows.push_back(static_cast<Index>(row));
+                const MatrixXd kernel = kernel_of(problem, sigma)(rows, rows);
+                const MatrixXd product = features.features * features.features.transpose();
+                EXPECT_LT((kernel - product).cwiseAbs().maxCoeff(), 1.001e-9);
+            }
+        }
+    }
+}
+
+TEST(KernelFeatures, CarryAFunctionToOtherFeatures) {
+    const auto problem = *make_lag_problem(testing::filtered_warm_up(testing::two_constants, 200, 2), 5, 0.0);
+    const auto rough = kernel_features(problem, 4.0, 1e-8, 4);
+    const auto fine = kernel_features(problem, 4.0, 1e-11, 1);
+    const VectorXd weights = VectorXd::LinSpaced(rough.features.cols(), -1.0, 1.0);
+    const VectorXd carried = weights_of(fine, rough.pivots, pivot_coefficients(rough, weights));
+    for (Index k = 0; k < rough.features.rows(); ++k) {
+        EXPECT_NEAR(rough.features.row(k).dot(weights), fine.features.row(4 * k).dot(carried), 1e-4);
+    }
+}
+
+struct Point {
+    std::size_t samples, lags;
+    double C, sigma;
+};
+
+std::vector<Point> points() {
+    std::vector<Point> all;
+    for (const std::size_t samples : {100, 192, 480}) {
+        for (const std::size_t lags : {1, 4, 17, 35}) {
+            for (const double C : {0.25, 16.0, 1024.0}) {
+                for (const double sigma : {0.5, 4.0, 32.0}) all.push_back({samples, lags, C, sigma});
+            }
+        }
+    }
+    return all;
+}
+
+constexpr TubeSolver::Schedule to_the_end{.last_smoothing = 1e-7, .most_steps = 1000};
+
+/// Optimality is proved, not compared: the dual objective of the coefficients on the full kernel matrix in
+/// double precision, against the primal objective of the function.
+TEST(TubeSolver, TheGapToTheDualObjectiveOnTheFullKernelIsClosed) {
+    for (const Point& point : points()) {
+        SCOPED_TRACE(std::to_string(point.samples) + " samples, n " + std::to_string(point.lags) + ", C " +
+                     std::to_string(point.C) + ", sigma " + std::to_string(point.sigma));
+        const auto window = testing::filtered_warm_up(testing::two_constants, point.samples, point.samples);
+        const auto problem = *make_lag_problem(window, point.lags, 0.0);
+        const auto features = kernel_features(problem, point.sigma, 0.01 * feature_tolerance(point.sigma));
+        const VectorXd y =
+            Eigen::Map<const VectorXd>(problem.targets().data(), static_cast<Index>(problem.rows()));
+        TubeSolver solver(features.features, y, 0.001);
+        ASSERT_TRUE(solver.fit(point.C, solver.cold_start(), to_the_end));
+        const VectorXd& c = solver.coefficients();
+        EXPECT_LE(c.cwiseAbs().maxCoeff(), point.C);
+        EXPECT_NEAR(c.sum(), 0.0, 1e-6 * (1.0 + c.lpNorm<1>()));
+        const VectorXd product = kernel_of(problem, point.sigma) * c;
+        const double dual = y.dot(c) - 0.001 * c.lpNorm<1>() - 0.5 * c.dot(product);
+        const VectorXd residual = y - product - VectorXd::Constant(y.size(), solver.state().bias);
+        const double loss = (residual.array().abs() - 0.001).max(0.0).sum();
+        const double primal = 0.5 * c.dot(product) + point.C * loss;
+        // The mean loss of a row is within a thousandth of epsilon of the smallest there is.
+        const double rows = static_cast<double>(y.size());
+        EXPECT_LT(primal - dual, 1e-6 * point.C * rows);
+        EXPECT_GT(primal - dual, -1e-6 * primal);
+    }
+}
+
+TEST(TubeSolver, PredictionsAreThoseOfScikitLearn) {
+    const auto all = points();
+    std::string requests;
+    for (const Point& p : all) {
+        requests +=
+            "fit" + testing::to_words({p.C, p.sigma, 0.001, 1e-6, static_cast<double>(p.lags)}) +
+            testing::to_words(testing::filtered_warm_up(testing::two_constants, p.samples, p.samples)) + "\n";
+    }
+    const auto answers = testing::ask_python("regression/svr_peer.py", requests);
+    ASSERT_EQ(answers.size(), all.size());
+    for (std::size_t k = 0; k < all.size(); ++k) {
+        const Point& point = all[k];
+        SCOPED_TRACE(std::to_string(point.samples) + " samples, n " + std::to_string(point.lags) + ", C " +
+                     std::to_string(point.C) + ", sigma " + std::to_string(point.sigma));
+        const auto window = testing::filtered_warm_up(testing::two_constants, point.samples, point.samples);
+        const auto problem = *make_lag_problem(window, point.lags, 0.0);
+        const auto model = fit_model(problem, point.C, point.sigma, SweepOptions{});
+        ASSERT_TRUE(model);
+        double largest = 0.0;
+        for (std::size_t row = 0; row < problem.rows(); ++row) {
+            largest =
+                std::max(largest, std::abs(model->predict_unit(problem.input(row)) - answers[k][row + 2]));
+        }
+        // libsvm's own default tolerance; its kernel is in single precision, which C = 1024 makes felt.
+        EXPECT_LT(largest, point.C > 100.0 ? 1e-3 : 1e-4);
+    }
+}
+
+/// A window that the literal pipeline finds hard: noise as large as the rise, a filled gap, next to no rise.
+std::vector<std::pair<std::string, Numbers>> hard_windows() {
+    std::vector<std::pair<std::string, Numbers>> windows;
+    windows.emplace_back("plain", testing::filtered_warm_up(testing::one_constant, 150, 1));
+    windows.emplace_back("three constants", testing::filtered_warm_up(testing::three_constants, 150, 2));
+    windows.emplace_back("noise 0.3 C", testing::filtered_warm_up(testing::two_constants, 150, 3, 0.3));
+    Numbers with_gap = testing::warm_up(testing::two_constants, 150);
+    for (double& value : with_gap) value = std::round(value * 10.0) / 10.0;
+    for (std::size_t k = 60; k < 75; ++k) with_gap[k] = NAN;
+    windows.emplace_back("gap", denoise(fill_short_gaps(with_gap, {})->values_C, {})->values_C);
+    Numbers nearly_flat = testing::filtered_warm_up(testing::one_constant, 150, 4);
+    for (double& value : nearly_flat) value = 20.0 + 0.03 * (value - 18.0);
+    windows.emplace_back("nearly flat", nearly_flat);
+    return windows;
+}
+
+TEST(LowRankSweep, ChoosesAsTheWholeGridByLibsvmDoes) {
+    SweepOptions ours;
+    SweepOptions reference;
+    reference.solver = SvrSolver::libsvm;
+    reference.solver_tolerance = 1e-4;
+    for (const auto& [name, window] : hard_windows()) {
+        for (const std::size_t lags : {1, 12}) {
+            SCOPED_TRACE(name + ", n " + std::to_string(lags));
+            const auto problem = *make_lag_problem(window, lags, 0.0);
+            const auto chosen = search_grid(problem, ours, never_cancelled);
+            const auto errors = cross_validate_grid(problem, reference, never_cancelled);
+            ASSERT_TRUE(chosen && errors);
+            const auto sigma = std::ranges::find(ours.sigma_grid, chosen->sigma) - ours.sigma_grid.begin();
+            const auto C = std::ranges::find(ours.C_grid, chosen->C) - ours.C_grid.begin();
+            const double at_ours = std::sqrt((
+                *errors)[static_cast<std::size_t>(sigma) * ours.C_grid.size() + static_cast<std::size_t>(C)]);
+            const double lowest = std::sqrt(*std::ranges::min_element(*errors));
+            EXPECT_LT(at_ours - lowest, 1e-3);  // libsvm's default tolerance on the [0, 1] scale
+            EXPECT_NEAR(std::sqrt(chosen->cv_mse_unit), at_ours, 1e-3 + 0.02 * at_ours);
+        }
+    }
+}
+
+TEST(LowRankSweep, LeavesNoGridPointThatTheWholeGridWouldChoose) {
+    const SweepOptions options;
+    for (std::uint64_t seed = 0; seed < 6; ++seed) {
+        const auto window =
+            testing::filtered_warm_up(seed % 2 == 0 ? testing::two_constants : testing::three_constants,
+                                      130 + 30 * seed, seed, 0.02 * static_cast<double>(seed + 1));
+        for (const std::size_t lags : {2, 9, 30}) {
+            const auto problem = *make_lag_problem(window, lags, 0.0);
+            const auto chosen = search_grid(problem, options, never_cancelled);
+            const auto errors = cross_validate_grid(problem, options, never_cancelled);
+            ASSERT_TRUE(chosen && errors);
+            EXPECT_NEAR(std::sqrt(chosen->cv_mse_unit), std::sqrt(*std::ranges::min_element(*errors)), 1e-6)
+                << "seed " << seed << " n " << lags;
+        }
+    }
+}
+
+}  // namespace
+}  // namespace thermbal
