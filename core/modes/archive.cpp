@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -10,27 +13,6 @@
 namespace thermbal {
 
 namespace {
-
-/// Cumulative share of the modes' variance along the grid.
-std::vector<double> cumulative_variance(const std::vector<double>& density,
-                                        const std::vector<double>& log_variance) {
-    std::vector<double> cumulative(density.size(), 0.0);
-    double sum = 0.0;
-    for (std::size_t g = 0; g < density.size(); ++g) {
-        sum += density[g] * std::exp(log_variance[g]);
-        cumulative[g] = sum;
-    }
-    if (sum > 0.0) {
-        for (double& value : cumulative) value /= sum;
-    }
-    return cumulative;
-}
-
-double distance_between(const std::vector<double>& first, const std::vector<double>& second, double spacing) {
-    double area = 0.0;
-    for (std::size_t g = 0; g < first.size(); ++g) area += std::abs(first[g] - second[g]) * spacing;
-    return area;
-}
 
 double log_spacing(const std::vector<double>& grid) {
     return std::log(grid[1] / grid[0]);
@@ -120,7 +102,7 @@ Result<SpectrumPrior> learn_prior(const std::vector<ArchivedSpectrum>& tests, co
             for (std::size_t other = 0; other < points; ++other) {
                 const double z = (static_cast<double>(g) - static_cast<double>(other)) / reach;
                 if (std::abs(z) > 4.0) continue;
-                const double weight = std::exp(-0.5 * z * z) / (reach * std::sqrt(2.0 * 3.141592653589793)) *
+                const double weight = std::exp(-0.5 * z * z) / (reach * std::sqrt(2.0 * std::numbers::pi)) *
                                       test.mode_density[other] / static_cast<double>(tests.size());
                 density += weight;
                 log_variance += weight * test.mode_log_variance[other];
@@ -147,39 +129,31 @@ Result<SpectrumPrior> learn_prior(const std::vector<ArchivedSpectrum>& tests, co
     return prior;
 }
 
-Contradiction compare_with_archive(const SpectrumEstimate& current,
-                                   const std::vector<ArchivedSpectrum>& tests, double trusted_after,
-                                   double least_distance) {
+Contradiction contradiction_of(const SpectrumEstimate& with_archive, double allowed_mode_energy) {
     Contradiction result;
-    if (tests.empty() || current.time_constant_min.size() < 2) return result;
-    const double spacing = log_spacing(current.time_constant_min);
-    const std::vector<double> now = cumulative_variance(current.mode_density, current.mode_log_variance);
-    std::vector<std::vector<double>> before;
-    for (const ArchivedSpectrum& test : tests) {
-        if (test.mode_density.size() != now.size()) continue;
-        before.push_back(cumulative_variance(test.mode_density, test.mode_log_variance));
-    }
-    if (before.empty()) return result;
-    result.distance = distance_between(now, before.front(), spacing);
-    for (std::size_t a = 0; a < before.size(); ++a) {
-        result.distance = std::min(result.distance, distance_between(now, before[a], spacing));
-        for (std::size_t b = a + 1; b < before.size(); ++b) {
-            result.usual_distance =
-                std::max(result.usual_distance, distance_between(before[a], before[b], spacing));
-        }
-    }
-    const double span_min = (current.window_end_s - current.window_start_s) / 60.0;
-    const bool trusted = span_min >= trusted_after * current.slowest_time_constant_min;
-    const double allowed = std::max(least_distance, 1.5 * result.usual_distance);
-    result.contradicted = trusted && result.distance > allowed;
+    result.mode_energy = with_archive.mode_energy;
+    result.contradicted = with_archive.used_responses && with_archive.mode_energy > allowed_mode_energy;
+    if (!result.contradicted) return result;
     result.reason = fmt::format(
-        "the spectrum of time constants lies {:.2f} (in log tau) from the nearest of {} earlier tests, "
-        "{:.2f} is allowed{}",
-        result.distance, before.size(), allowed,
-        result.contradicted ? ": the machine is not the one of the archive, its prior is dropped"
-        : trusted           ? ""
-                            : "; the window is too short to judge");
+        "earlier tests of this machine do not fit this one (what they leave over is {:.2f}, {:.2f} is "
+        "allowed): the machine "
+        "or its start differs, the archive is not used",
+        result.mode_energy, allowed_mode_energy);
     return result;
+}
+
+Result<ArchivedEstimate> estimate_with_archive(const TestWindow& window, std::string_view ambient,
+                                               const SpectrumPrior& prior, const SpectrumOptions& options,
+                                               std::uint64_t seed, const std::vector<double>& start_level_C) {
+    Result<SpectrumEstimate> estimate =
+        estimate_spectrum(window, ambient, prior, options, seed, start_level_C);
+    if (!estimate) return std::unexpected(estimate.error());
+    Contradiction contradiction = contradiction_of(*estimate);
+    if (contradiction.contradicted) {
+        estimate = estimate_spectrum(window, ambient, std::nullopt, options, seed, start_level_C);
+        if (!estimate) return std::unexpected(estimate.error());
+    }
+    return ArchivedEstimate{std::move(*estimate), std::move(contradiction)};
 }
 
 }  // namespace thermbal

@@ -105,10 +105,6 @@ double ChannelModel::settled(const Eigen::VectorXd& sample) const {
            sample.tail(sample.size() - functional_.size()).sum();
 }
 
-double ChannelModel::chi_square() const {
-    return left_.dot(dual_) / static_cast<double>(left_.size());
-}
-
 Eigen::VectorXd ChannelModel::mean_background() const {
     return prior_mean_ + prior_variance_.cwiseProduct(rows_.transpose() * dual_);
 }

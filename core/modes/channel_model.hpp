@@ -51,7 +51,6 @@ class ChannelModel {
     Eigen::VectorXd mean_background() const;  ///< coefficients of the basis, then of the archived responses
     Eigen::VectorXd mean_modes() const;       ///< amplitudes of the modes
     double settled(const Eigen::VectorXd& sample) const;  ///< steady state of a draw
-    double chi_square() const;                            ///< of the reduced samples, a degree of freedom
     /// One draw of all coefficients (basis, archived responses, modes) by Matheron's rule.
     Eigen::VectorXd draw(Random& random) const;
 

@@ -378,7 +378,7 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
             curves.design.middleCols(1, basis.grid()) * responses[k].topRows(basis.grid()) +
             curves.fine * responses[k].bottomRows(curves.fine.cols());
     }
-    double chi_square = 0.0;
+    std::vector<double> energies;
     Eigen::VectorXd density = Eigen::VectorXd::Zero(modes_prior.log_tau.size());
     Eigen::VectorXd log_variance = Eigen::VectorXd::Zero(modes_prior.log_tau.size());
     const double share = 1.0 / static_cast<double>(states.size());
@@ -392,6 +392,7 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
         for (Eigen::Index k = 0; k < count; ++k) logs[k] = modes[static_cast<std::size_t>(k)].log_variance;
         add_on_grid(modes, Eigen::VectorXd::Ones(count), share, density);
         add_on_grid(modes, logs, share, log_variance);
+        energies.push_back(logs.array().exp().sum());
         const bool with_curve = state % curve_every == 0;
         const Eigen::MatrixXd steps =
             with_curve ? mode_curves(modes, modes_prior, curves.minute) : Eigen::MatrixXd();
@@ -401,7 +402,7 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
             const ConditionalValue value = model.steady_state();
             draws[k].mean.push_back(value.mean);
             draws[k].variance.push_back(value.variance);
-            chi_square += share * model.chi_square() / static_cast<double>(used.size());
+
             draws[k].background += share * model.mean_background();
             add_on_grid(modes, model.mean_modes(), share, draws[k].fine);
             if (!with_curve) continue;
@@ -427,7 +428,9 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
                                                               : modes_prior.log_variance_mean[g]);
     }
     estimate.expected_modes = density.sum();
-    estimate.chi_square = chi_square;
+    estimate.mode_energy = sorted_quantile(energies, 0.5);
+    estimate.used_responses = std::any_of(responses.begin(), responses.end(),
+                                          [](const Eigen::MatrixXd& each) { return each.cols() > 0; });
     estimate.window_start_s = window.start_s;
     estimate.window_end_s = window.end_s();
     estimate.ambient_reference_C = room.reference_C;

@@ -1,7 +1,8 @@
 #pragma once
 
-#include <optional>
+#include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/error.hpp"
@@ -43,21 +44,26 @@ ArchivedSpectrum archived(const SpectrumEstimate& complete_test);
 Result<SpectrumPrior> learn_prior(const std::vector<ArchivedSpectrum>& tests, const SpectrumOptions& spectrum,
                                   const ArchiveOptions& options);
 
-/// Whether a window contradicts the archive: the mean log density that the archive gives to the modes of the
-/// window (estimated without it), against what it gives to the modes of its own tests, each test left out in
-/// turn.
+/// Whether a window contradicts the archive: its responses, freely scaled and mixed, do not fit, so that the
+/// modes, meant for small differences, carry much amplitude. Matching machines stay below 0.6, other machines
+/// of the same kind lie at 0.9 to 60 (README).
 struct Contradiction {
     bool contradicted = false;
-    double distance = 0.0;        ///< earth mover's distance of the amplitude-weighted spectra, in log tau
-    double usual_distance = 0.0;  ///< the largest between two of the archive's own tests (0 with one test)
-    std::string reason;           ///< one line for a person, with the figures
+    double mode_energy = 0.0;
+    std::string reason;  ///< one line for a person, with the figures; empty without contradiction
 };
 
-/// `current` is the estimate of the window without the archive. The distance compares where on the axis of
-/// time constants the slow half of the amplitudes sits; it is trusted once the window is `trusted_after`
-/// slowest time constants long.
-Contradiction compare_with_archive(const SpectrumEstimate& current,
-                                   const std::vector<ArchivedSpectrum>& tests, double trusted_after = 1.2,
-                                   double least_distance = 0.30);
+Contradiction contradiction_of(const SpectrumEstimate& with_archive, double allowed_mode_energy = 0.7);
+
+/// The estimate with the archive's prior, or, if the window contradicts it, without.
+struct ArchivedEstimate {
+    SpectrumEstimate estimate;
+    Contradiction contradiction;
+};
+
+Result<ArchivedEstimate> estimate_with_archive(const TestWindow& window, std::string_view ambient,
+                                               const SpectrumPrior& prior, const SpectrumOptions& options,
+                                               std::uint64_t seed,
+                                               const std::vector<double>& start_level_C = {});
 
 }  // namespace thermbal

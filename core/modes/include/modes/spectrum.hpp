@@ -110,9 +110,11 @@ struct SpectrumEstimate {
     double slowest_time_constant_min = 0.0;  ///< slowest that carries at least 5 % of all amplitudes
     std::size_t blocks = 0;                  ///< rows the fit saw
     std::vector<double> background_time_constant_min;
-    /// Joint chi-square of the reduced samples a degree of freedom, under the prior: about 1, or below; far
-    /// above 1 if an archive's responses cannot be bent to the samples.
-    double chi_square = 0.0;
+    /// Posterior median of the summed relative variances of the modes: how much amplitude, in squared scales,
+    /// they carry. Under an archive's responses, far above its prior's if these cannot be bent to the
+    /// samples.
+    double mode_energy = 0.0;
+    bool used_responses = false;  ///< archived responses took part
 };
 
 /// Estimates where every structural channel of `window` settles from time constants that all of them share.
