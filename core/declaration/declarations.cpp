@@ -57,6 +57,14 @@ std::vector<DeclarationChange> Declarations::update(const std::vector<ChannelVer
     return changes;
 }
 
+std::set<std::string> Declarations::declared_channels() const {
+    std::set<std::string> channels;
+    for (const ChannelVerdict& verdict : standing_) {
+        if (verdict.declared()) channels.insert(verdict.channel);
+    }
+    return channels;
+}
+
 void Declarations::restore(std::vector<ChannelVerdict> declared) { standing_ = std::move(declared); }
 
 }  // namespace thermbal

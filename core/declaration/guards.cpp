@@ -23,6 +23,26 @@ double last_good(std::span<const double> values) {
     return no_value;
 }
 
+double mean_of_first(std::span<const double> values, std::size_t count) {
+    double sum = 0.0;
+    int good = 0;
+    for (const double value : values.first(std::min(count, values.size()))) {
+        if (!std::isfinite(value)) continue;
+        sum += value;
+        ++good;
+    }
+    return good > 0 ? sum / good : no_value;
+}
+
+Guard no_recent_change(const Evidence& evidence, const GuardOptions& options) {
+    const bool ever = evidence.regime.last_change_s > evidence.window.start_s || !evidence.regime.began_with.empty();
+    const double since_min = (evidence.window.end_s() - evidence.regime.last_change_s) / 60.0;
+    return {"no_recent_change", !ever || since_min >= options.after_change_min,
+            ever ? fmt::format("{:.1f} min since the last change of speed or room (needed {:.0f} min)", since_min,
+                               options.after_change_min)
+                 : std::string("one regime")};
+}
+
 Guard enough_samples(const Evidence& evidence, const GuardOptions& options) {
     const double window_min = (evidence.window.end_s() - evidence.window.start_s) / 60.0;
     const auto good = std::ranges::count_if(evidence.samples.values, [](double value) { return std::isfinite(value); });
@@ -99,8 +119,19 @@ bool is_stuck(const Evidence& evidence, const GuardOptions& options) {
 
 }  // namespace
 
-Regime current_regime(const TestWindow& window, const FlowOptions& /*options*/) {
-    return {window.start_s, "", window};
+Regime current_regime(const TestWindow& window, const FlowOptions& options) {
+    const RegimeReport report = find_regime_changes(window, options.ambient, options.regime);
+    Regime regime{window.start_s, "", report.last_change_s, {}, {}};
+    for (const RegimeChange& change : report.changes) {
+        if (!change.restarts_window) continue;
+        regime.since_s = report.usable_from_s;
+        regime.began_with = fmt::format("the {} at {:.1f} min", to_string(change.kind), change.time_s / 60.0);
+    }
+    regime.window = window_from(window, regime.since_s);
+    if (regime.began_with.empty()) return regime;
+    constexpr std::size_t first_scans = 4;
+    for (const Column& column : window.channels) regime.start_level_C.push_back(mean_of_first(column.values, first_scans));
+    return regime;
 }
 
 ChannelVerdict begin_verdict(const Column& column, double window_end_min) {
@@ -129,6 +160,7 @@ void ask_samples(ChannelVerdict& verdict, const Evidence& evidence, const FlowOp
                                     : std::string("its readings change")});
     if (stuck) verdict.state = ChannelState::stuck;
     verdict.guards.push_back(enough_samples(evidence, options.guards));
+    verdict.guards.push_back(no_recent_change(evidence, options.guards));
 }
 
 void take_estimate(ChannelVerdict& verdict, const Evidence& evidence) {

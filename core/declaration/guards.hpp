@@ -10,8 +10,10 @@ namespace thermbal {
 /// The stretch of the window in which the machine's inputs did not change, up to its end.
 struct Regime {
     double since_s = 0.0;
-    std::string began_with;  ///< what changed there; empty at the start of the test
+    std::string began_with;      ///< what changed there; empty at the start of the test
+    double last_change_s = 0.0;  ///< of the inputs, also one that the estimate can carry across
     TestWindow window;
+    std::vector<double> start_level_C;  ///< of the channels at the start of the test; empty when it is this regime's
 };
 Regime current_regime(const TestWindow& window, const FlowOptions& options);
 

@@ -11,8 +11,8 @@
 
 namespace thermbal {
 
-Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const ParallelFor& parallel_for,
-                                         const std::function<bool()>& cancelled) {
+Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::set<std::string>& settled,
+                                         const ParallelFor& parallel_for, const std::function<bool()>& cancelled) {
     if (!options_.ambient.empty() && window.channel(options_.ambient) == nullptr) {
         return fail(NextStep::refuse_input, fmt::format("the ambient channel {} is not in the test", options_.ambient));
     }
@@ -20,11 +20,11 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const Paralle
     const TestWindow& since = regime.window;
     WindowVerdict verdict{window.end_s() / 60.0, regime.since_s / 60.0, {}};
 
-    const auto& now = estimate(since);
+    const auto& now = estimate(since, regime.start_level_C);
     std::vector<const SpectrumEstimate*> shorter;  // the same regime seen from a little earlier
     for (const double back : {1.0, 2.0}) {
         const TestWindow before = window_until(since, since.end_s() - back * options_.guards.look_back_min * 60.0);
-        const auto& estimated = estimate(before);
+        const auto& estimated = estimate(before, regime.start_level_C);
         if (estimated) shorter.push_back(&*estimated);
     }
 
@@ -38,7 +38,7 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const Paralle
             take_estimate(channel, evidence);
             ask_shared_modes(channel, evidence, options_);
         }
-        if (sweep_is_wanted(channel)) {
+        if (!settled.contains(channel.channel) && sweep_is_wanted(channel)) {
             const auto swept = sweep_channel(samples.values, since.start_s, since.period_s, options_, parallel_for, cancelled);
             if (cancelled()) return fail(NextStep::stop, "cancelled");
             ask_sweep(channel, swept, options_);
@@ -59,7 +59,8 @@ bool LiveFlow::sweep_is_wanted(const ChannelVerdict& channel) const {
     return false;
 }
 
-const Result<SpectrumEstimate>& LiveFlow::estimate(const TestWindow& regime) {
+const Result<SpectrumEstimate>& LiveFlow::estimate(const TestWindow& regime,
+                                                   const std::vector<double>& start_level_C) {
     const std::pair key{std::llround(regime.start_s * 1e3), regime.scans};
     const auto known = estimates_.find(key);
     if (known != estimates_.end()) return known->second;
@@ -67,7 +68,8 @@ const Result<SpectrumEstimate>& LiveFlow::estimate(const TestWindow& regime) {
     constexpr std::size_t remembered = 64;
     while (estimates_.size() >= remembered) estimates_.erase(estimates_.begin());
     return estimates_
-        .emplace(key, estimate_spectrum(regime, options_.ambient, options_.prior, options_.spectrum, options_.seed))
+        .emplace(key, estimate_spectrum(regime, options_.ambient, options_.prior, options_.spectrum, options_.seed,
+                                        start_level_C))
         .first->second;
 }
 

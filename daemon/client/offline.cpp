@@ -96,7 +96,7 @@ int run_identify(const OfflineOptions& options) {
     if (options.until_min) input->window = window_until(input->window, *options.until_min * 60.0);
     if (!options.modes_only) input->flow.sweep_when = SweepWhen::always;
     LiveFlow flow(input->flow);
-    const auto verdict = flow.identify(input->window, parallel_on_threads(options.threads, false), not_cancelled);
+    const auto verdict = flow.identify(input->window, {}, parallel_on_threads(options.threads, false), not_cancelled);
     if (!verdict) return refused(verdict.error());
     if (options.json) {
         fmt::print("{}\n", json{{"window_end_min", verdict->window_end_min},
@@ -123,7 +123,7 @@ int run_replay(const OfflineOptions& options) {
     const double first_min = input->window.start_s / 60.0;
     for (double until_min = first_min + options.every_min; until_min <= end_min + 1e-9; until_min += options.every_min) {
         const TestWindow window = window_until(input->window, until_min * 60.0);
-        const auto verdict = flow.identify(window, parallel_for, not_cancelled);
+        const auto verdict = flow.identify(window, declarations.declared_channels(), parallel_for, not_cancelled);
         if (!verdict && verdict.error().next == NextStep::refuse_input) return refused(verdict.error());
         if (!verdict) continue;
         for (const DeclarationChange& change : declarations.update(verdict->channels, verdict->regime_since_min)) {
@@ -148,7 +148,7 @@ int run_replay(const OfflineOptions& options) {
     if (!decision.stop && !options.modes_only) {
         FlowOptions everything = input->flow;
         everything.sweep_when = SweepWhen::always;
-        const auto verdict = LiveFlow(everything).identify(input->window, parallel_for, not_cancelled);
+        const auto verdict = LiveFlow(everything).identify(input->window, declarations.declared_channels(), parallel_for, not_cancelled);
         for (ChannelVerdict& channel : last) {
             if (channel.declared() || !verdict) continue;
             const auto whole = std::ranges::find(verdict->channels, channel.channel, &ChannelVerdict::channel);

@@ -56,7 +56,7 @@ void Identifier::run(const std::stop_token& stop) {
             return number < cancelled_before_;
         };
         const auto started = std::chrono::steady_clock::now();
-        auto verdict = identify_(job.window, cancelled);
+        auto verdict = identify_(job, cancelled);
         const std::chrono::duration<double> took = std::chrono::steady_clock::now() - started;
         if (!cancelled()) done_({job.generation, job.window_end_scan, took.count(), std::move(verdict)});
     }

@@ -61,7 +61,7 @@ CREATE TABLE samples (
   channel INTEGER NOT NULL,
   raw INTEGER CHECK (raw BETWEEN 0 AND 4294967295),
   value_C REAL CHECK (abs(value_C) < 1e300),
-  quality TEXT NOT NULL CHECK (quality IN ('good', 'open', 'shorted', 'over_range', 'under_range', 'stuck',
+  quality TEXT NOT NULL CHECK (quality IN ('good', 'open', 'short', 'over_range', 'under_range', 'stuck',
                                            'stale', 'communication', 'gap')),
   PRIMARY KEY (test_id, scan, channel),
   FOREIGN KEY (test_id, scan) REFERENCES scans,

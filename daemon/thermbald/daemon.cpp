@@ -23,7 +23,7 @@ void Daemon::take_scan(const Scan& scan) {
         grow_window(scan);
         if (identification_is_due(scan.scan)) {
             test_.submitted_scan = scan.scan;
-            identifier_->submit({generation_, scan.scan, test_.window});
+            identifier_->submit({generation_, scan.scan, test_.window, test_.declarations.declared_channels()});
         }
         if (over_time(scan)) {
             end_test(TestEvent::abort, fmt::format("longer than test.max_duration_min = {}",

@@ -57,8 +57,8 @@ Daemon::Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer se
     const Config& config = options_.config;
     identifier_ = std::make_unique<Identifier>(
         [flow = LiveFlow(flow_options(config)), parallel = parallel_on_threads(config.identification.workers, true)](
-            const TestWindow& window, const std::function<bool()>& cancelled) mutable {
-            return flow.identify(window, parallel, cancelled);
+            const IdentificationJob& job, const std::function<bool()>& cancelled) mutable {
+            return flow.identify(job.window, job.settled, parallel, cancelled);
         },
         [this](IdentificationResult result) { identifications_.push(std::move(result)); });
     for (std::size_t i = 0; i < lines_.size(); ++i) {

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -58,6 +59,15 @@ std::pair<std::unique_ptr<Clock>, std::string> make_clock(const Flags& flags) {
     return {system_clock(), boot_id()};
 }
 
+/// Signals are the event loop's: blocked here, before the first thread, so that no other thread takes one.
+void leave_signals_to_the_loop() {
+    sigset_t signals;
+    sigemptyset(&signals);
+    for (const int signal : {SIGTERM, SIGINT}) sigaddset(&signals, signal);
+    pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+    std::signal(SIGPIPE, SIG_IGN);
+}
+
 int refused(const Error& error) {
     fmt::print(stderr, "{}\n", error.message);
     return error.next == NextStep::refuse_input ? 2 : 1;
@@ -103,6 +113,7 @@ int main(int argc, char** argv) {
     // Under systemd the journal stamps every line.
     spdlog::set_pattern(std::getenv("JOURNAL_STREAM") != nullptr ? "%l: %v" : "%Y-%m-%dT%H:%M:%S.%e %l: %v");
 
+    leave_signals_to_the_loop();
     auto [clock, clock_name] = make_clock(flags);
     auto daemon = Daemon::create({std::move(*config), version, clock_name, flags.exit_when_ended}, *clock);
     if (!daemon) return refused(daemon.error());

@@ -36,8 +36,9 @@ void Daemon::store_scan(const Scan& scan) {
         return;
     }
     if (stored.error().next == NextStep::refuse_input) {
-        spdlog::error("scan {} is refused by the database: {}", scan.scan, stored.error().message);
+        lost_scans_ += unstored_.size();
         unstored_.clear();
+        event("scan_refused", fmt::format("scan {} is refused by the database: {}", scan.scan, stored.error().message));
     } else if (!waiting_already) {
         spdlog::error("the database does not take scans: {}; they are kept in memory, up to {}", stored.error().message,
                       most_unstored);

@@ -37,7 +37,7 @@ TEST_F(OpeningTest, TheDatabaseIsDurableStrictAndNotForEveryone) {
     const auto store = open_store(path);
     Direct direct(path);
     EXPECT_EQ(direct.integer("SELECT journal_mode = 'wal' FROM pragma_journal_mode"), 1);
-    EXPECT_EQ(direct.integer("PRAGMA user_version"), 2);
+    EXPECT_EQ(direct.integer("PRAGMA user_version"), 3);
     EXPECT_EQ(
         direct.integer("SELECT count(*) FROM pragma_table_list WHERE schema = 'main' AND type = 'table' AND "
                        "name NOT LIKE 'sqlite_%' AND NOT strict"),
@@ -126,7 +126,7 @@ TEST_F(OpeningTest, ANewerDatabaseIsRefusedAndLeftAlone) {
         const auto store = open_store(path);
     }
     {
-        Direct(path).run("PRAGMA user_version = 3");
+        Direct(path).run("PRAGMA user_version = 4");
     }
     const auto before = contents(path);
     for (const auto& message :

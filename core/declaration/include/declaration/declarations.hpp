@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,9 @@ class Declarations {
 
     /// Declarations that an earlier life of the daemon made and stored.
     void restore(std::vector<ChannelVerdict> declared);
+
+    /// The channels whose declaration stands.
+    std::set<std::string> declared_channels() const;
 
     /// The standing declarations and, of the other channels, the latest verdicts; in the order of the last update.
     const std::vector<ChannelVerdict>& standing() const { return standing_; }

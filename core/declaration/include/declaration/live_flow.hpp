@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "filter/denoise.hpp"
 #include "filter/gaps.hpp"
 #include "filter/outliers.hpp"
+#include "modes/regime.hpp"
 #include "modes/spectrum.hpp"
 #include "regression/sweep.hpp"
 #include "series/recorded_test.hpp"
@@ -22,6 +24,7 @@ namespace thermbal {
 
 struct GuardOptions {
     double shortest_window_min = 20.0;    ///< of one regime
+    double after_change_min = 15.0;       ///< no declaration sooner after any change of the machine's inputs
     double good_share = 0.8;              ///< of a channel's samples in the window
     double look_back_min = 4.0;           ///< "stable": the window, one this much shorter, and one twice as much
     double drift_in_tolerances = 0.75;    ///< how far the prediction may move over both
@@ -49,6 +52,7 @@ struct FlowOptions {
     SweepOptions sweep;
     CriterionOptions criterion;
     SpectrumOptions spectrum;
+    RegimeOptions regime;
     std::optional<SpectrumPrior> prior;  ///< what earlier tests of the machine say
     GuardOptions guards;
     std::uint64_t seed = 1;     ///< of everything that is sampled; the same seed gives the same bits
@@ -71,14 +75,16 @@ class LiveFlow {
 
     /// Errors: refuse_input when the window cannot be identified at all (no structural channel, unknown ambient),
     /// retry when it is still too short for anything, stop when `cancelled` said so.
-    Result<WindowVerdict> identify(const TestWindow& window, const ParallelFor& parallel_for,
-                                   const std::function<bool()>& cancelled);
+    /// `settled` says of which channels the verdict is no longer asked: those with a standing declaration are still
+    /// estimated, so that it can be contradicted, but not swept again.
+    Result<WindowVerdict> identify(const TestWindow& window, const std::set<std::string>& settled,
+                                   const ParallelFor& parallel_for, const std::function<bool()>& cancelled);
 
     const FlowOptions& options() const { return options_; }
 
   private:
     bool sweep_is_wanted(const ChannelVerdict& channel) const;
-    const Result<SpectrumEstimate>& estimate(const TestWindow& regime);
+    const Result<SpectrumEstimate>& estimate(const TestWindow& regime, const std::vector<double>& start_level_C);
 
     FlowOptions options_;
     std::map<std::pair<std::int64_t, std::size_t>, Result<SpectrumEstimate>> estimates_;  // by start and scans

@@ -5,6 +5,8 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <set>
+#include <string>
 #include <thread>
 
 #include "base/error.hpp"
@@ -18,6 +20,7 @@ struct IdentificationJob {
     std::uint64_t generation = 0;     ///< of the test; a result of an earlier one is of no use any more
     std::int64_t window_end_scan = 0;
     TestWindow window;
+    std::set<std::string> settled;    ///< channels whose declaration stands
 };
 struct IdentificationResult {
     std::uint64_t generation = 0;
@@ -31,7 +34,7 @@ struct IdentificationResult {
 class Identifier {
   public:
     using Identify =
-        std::function<Result<WindowVerdict>(const TestWindow& window, const std::function<bool()>& cancelled)>;
+        std::function<Result<WindowVerdict>(const IdentificationJob& job, const std::function<bool()>& cancelled)>;
 
     /// `done` is called on the identifier's thread.
     Identifier(Identify identify, std::function<void(IdentificationResult)> done);
