@@ -1,46 +1,31 @@
-#include <CLI/CLI.hpp>
+#include <clocale>
 
-#include "offline.hpp"
+#include "commands.hpp"
 #include "version.hpp"
 
 namespace {
 
-void add_recording_flags(CLI::App& command, thermbal::OfflineOptions& options) {
-    command.add_option("FILE", options.file, "recorded test: CSV, first column time_s, then T1 ... T16")->required();
-    command.add_option("--ambient", options.ambient, "channel that measures the room, or none")->capture_default_str();
-    command.add_option("--channel", options.channels, "report only this channel; may be given several times");
-    command.add_option("--archive", options.archive, "database with earlier tests of the same machine");
-    command.add_option("--machine", options.machine, "whose earlier tests in the archive");
-    command.add_option("--tolerance-C", options.tolerance_C, "half width of the 90 % interval that is asked for")
-        ->capture_default_str()
-        ->check(CLI::Range(0.01, 10.0));
-    command.add_option("--threads", options.threads, "compute threads")->capture_default_str()->check(CLI::Range(1, 256));
-    command.add_flag("--modes-only", options.modes_only, "a study: the shared modes alone, without the SVR criterion");
-    command.add_flag("--json", options.json, "one JSON document on standard output");
+/// One line that says what was wrong and where to read on.
+std::string one_line(const CLI::App* app, const CLI::Error& error) {
+    std::string command = "thermbalctl";
+    for (const CLI::App* sub : app->get_subcommands()) command += " " + sub->get_name();
+    return "thermbalctl: " + std::string(error.what()) + "; see " + command + " --help\n";
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-    CLI::App app("Asks a running thermbald over its socket, and does the same work offline on files.", "thermbalctl");
+    std::setlocale(LC_CTYPE, "");  // NOLINT(concurrency-mt-unsafe): before anything else runs
+    CLI::App app("Asks a running thermbald over its socket, and does the same work offline on files.",
+                 "thermbalctl");
     app.set_version_flag("--version", std::string("thermbalctl ") + thermbal::version);
+    app.footer("thermbalctl COMMAND --help says more. Exit status: 0 done, 1 failed, 2 wrong usage.");
+    app.failure_message(one_line);
     app.require_subcommand(1);
     int status = 0;
-
-    thermbal::OfflineOptions identify;
-    CLI::App& identify_command = *app.add_subcommand("identify", "identify a recorded test once");
-    add_recording_flags(identify_command, identify);
-    identify_command.add_option("--until-min", identify.until_min, "use only the samples up to this time");
-    identify_command.callback([&] { status = thermbal::run_identify(identify); });
-
-    thermbal::OfflineOptions replay;
-    CLI::App& replay_command = *app.add_subcommand("replay", "run the growing window as the daemon would have");
-    add_recording_flags(replay_command, replay);
-    replay_command.add_option("--every-min", replay.every_min, "minutes of samples between two identifications")
-        ->capture_default_str()
-        ->check(CLI::Range(0.01, 1e6));
-    replay_command.callback([&] { status = thermbal::run_replay(replay); });
-
+    thermbal::add_daemon_commands(app, status);
+    thermbal::add_database_commands(app, status);
+    thermbal::add_offline_commands(app, status);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

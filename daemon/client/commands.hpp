@@ -1,0 +1,17 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace thermbal {
+
+// Each adds subcommands to the program; parsing runs what was asked for, and leaves its exit status in
+// `status`.
+
+/// status, channels, predictions, curve, samples, events, health, watch, start, stop, annotate.
+void add_daemon_commands(CLI::App& app, int& status);
+/// tests, export, verify, backup, ports.
+void add_database_commands(CLI::App& app, int& status);
+/// identify, replay.
+void add_offline_commands(CLI::App& app, int& status);
+
+}  // namespace thermbal

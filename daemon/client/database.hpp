@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "ask.hpp"
+
+namespace thermbal {
+
+struct DatabaseOptions {
+    AskOptions ask;  ///< the daemon that says where its database is, when `database` is empty
+    std::string database;
+};
+
+// On the database itself, beside a running daemon or without one. Each returns the exit status.
+
+/// The stored tests, newest first.
+int run_tests(const DatabaseOptions& options);
+
+/// A test (without an id the newest) as the CSV of INTERFACES, into a file or "-".
+int run_export(const DatabaseOptions& options, std::optional<std::int64_t> test, const std::string& csv);
+
+/// 1 when anything is wrong with the file.
+int run_verify(const DatabaseOptions& options);
+
+int run_backup(const DatabaseOptions& options, const std::string& copy);
+
+}  // namespace thermbal

@@ -1,0 +1,53 @@
+#include <memory>
+
+#include "commands.hpp"
+#include "offline.hpp"
+
+namespace thermbal {
+namespace {
+
+constexpr char group[] = "On a recorded test";
+
+void add_recording_flags(CLI::App& command, OfflineOptions& options) {
+    command.add_option("FILE", options.file, "recorded test: CSV, first column time_s, then T1 ... T16")
+        ->required();
+    command.add_option("--ambient", options.ambient, "channel that measures the room, or none")
+        ->capture_default_str();
+    command.add_option("--channel", options.channels, "report only this channel; may be given several times");
+    command.add_option("--archive", options.archive, "database with earlier tests of the same machine");
+    command.add_option("--machine", options.machine, "whose earlier tests in the archive");
+    command
+        .add_option("--tolerance-C", options.tolerance_C, "half width of the 90 % interval that is asked for")
+        ->capture_default_str()
+        ->check(CLI::Range(0.01, 10.0));
+    command.add_option("--threads", options.threads, "compute threads")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 256));
+    command.add_flag("--modes-only", options.modes_only,
+                     "a study: the shared modes alone, without the SVR criterion");
+    command.add_flag("--json", options.json, "one JSON document on standard output");
+}
+
+}  // namespace
+
+void add_offline_commands(CLI::App& app, int& status) {
+    const auto identify = std::make_shared<OfflineOptions>();
+    CLI::App& identify_command = *app.add_subcommand("identify", "identify a recorded test once");
+    identify_command.group(group);
+    add_recording_flags(identify_command, *identify);
+    identify_command.add_option("--until-min", identify->until_min, "use only the samples up to this time");
+    identify_command.callback([&status, identify] { status = run_identify(*identify); });
+
+    const auto replay = std::make_shared<OfflineOptions>();
+    CLI::App& replay_command =
+        *app.add_subcommand("replay", "run the growing window as the daemon would have");
+    replay_command.group(group);
+    add_recording_flags(replay_command, *replay);
+    replay_command
+        .add_option("--every-min", replay->every_min, "minutes of samples between two identifications")
+        ->capture_default_str()
+        ->check(CLI::Range(0.01, 1e6));
+    replay_command.callback([&status, replay] { status = run_replay(*replay); });
+}
+
+}  // namespace thermbal
