@@ -61,41 +61,63 @@ void AdaptiveUnscentedKalman::start(double temperature_C) {
     samples_ = 1;
     first_C_ = temperature_C;
     noise_variance_ = square(options_.measurement_sd_C);
-    state_ = {temperature_C, temperature_C + options_.initial_rise_C,
-              std::log(options_.initial_time_constant_min)};
+    state_ = {temperature_C, 0.0, std::log(options_.initial_time_constant_min)};
     covariance_ = {};
     covariance_[0][0] = noise_variance_;
-    covariance_[1][1] = square(options_.initial_rise_sd_C);
+    covariance_[1][1] = square(options_.initial_slope_sd_C_per_min);
     covariance_[2][2] = square(options_.initial_log_time_constant_sd);
 }
 
-void AdaptiveUnscentedKalman::predict() {
-    // Symmetric sigma points at sqrt(size) standard deviations, equally weighted.
-    constexpr std::size_t points = 2 * size;
+std::array<AdaptiveUnscentedKalman::State, 2 * AdaptiveUnscentedKalman::size>
+AdaptiveUnscentedKalman::sigma_points() const {
     const Covariance factor = lower_factor(covariance_);
     const double spread = std::sqrt(static_cast<double>(size));
-    const double period_min = options_.period_s / seconds_per_min;
-    std::array<State, points> moved;
-    State mean{};
-    for (std::size_t point = 0; point < points; ++point) {
-        State sigma = state_;
+    std::array<State, 2 * size> points;
+    for (std::size_t point = 0; point < points.size(); ++point) {
+        points[point] = state_;
         const double sign = point < size ? spread : -spread;
-        for (std::size_t row = 0; row < size; ++row) sigma[row] += sign * factor[row][point % size];
-        sigma[2] = std::clamp(sigma[2], fastest_log_min, slowest_log_min);
-        sigma[0] = sigma[1] + (sigma[0] - sigma[1]) * std::exp(-period_min / std::exp(sigma[2]));
-        moved[point] = sigma;
-        for (std::size_t row = 0; row < size; ++row) mean[row] += sigma[row] / static_cast<double>(points);
+        for (std::size_t row = 0; row < size; ++row) points[point][row] += sign * factor[row][point % size];
+        points[point][2] = std::clamp(points[point][2], fastest_log_min, slowest_log_min);
+    }
+    return points;
+}
+
+AdaptiveUnscentedKalman::Settled AdaptiveUnscentedKalman::settled() const {
+    double sum = 0.0;
+    double square = 0.0;
+    const auto points = sigma_points();
+    const double centre = state_[0] + state_[1] * std::exp(state_[2]);
+    for (const State& point : points) {
+        const double value = point[0] + point[1] * std::exp(point[2]) - centre;
+        sum += value / static_cast<double>(points.size());
+        square += value * value / static_cast<double>(points.size());
+    }
+    return {centre + sum, std::sqrt(std::max(0.0, square - sum * sum))};
+}
+
+void AdaptiveUnscentedKalman::predict() {
+    std::array<State, 2 * size> moved = sigma_points();
+    const double period_min = options_.period_s / seconds_per_min;
+    const auto points = static_cast<double>(moved.size());
+    State mean{};
+    for (State& sigma : moved) {
+        const double tau = std::exp(sigma[2]);
+        const double decay = std::exp(-period_min / tau);
+        sigma[0] += sigma[1] * tau * (1.0 - decay);
+        sigma[1] *= decay;
+        for (std::size_t row = 0; row < size; ++row) mean[row] += sigma[row] / points;
     }
     covariance_ = {};
     for (const State& sigma : moved) {
         for (std::size_t row = 0; row < size; ++row) {
             for (std::size_t column = 0; column < size; ++column) {
                 covariance_[row][column] +=
-                    (sigma[row] - mean[row]) * (sigma[column] - mean[column]) / static_cast<double>(points);
+                    (sigma[row] - mean[row]) * (sigma[column] - mean[column]) / points;
             }
         }
     }
-    covariance_[1][1] += options_.equilibrium_walk_C * options_.equilibrium_walk_C;
+    const double slope_walk = options_.slope_walk_share * mean[1];
+    covariance_[1][1] += slope_walk * slope_walk;
     covariance_[2][2] += options_.log_time_constant_walk * options_.log_time_constant_walk;
     state_ = mean;
 }
@@ -131,10 +153,6 @@ void AdaptiveUnscentedKalman::update(double temperature_C) {
     ++samples_;
 }
 
-double AdaptiveUnscentedKalman::steady_state_sd_C() const {
-    return std::sqrt(covariance_[1][1]);
-}
-
 double AdaptiveUnscentedKalman::time_constant_min() const {
     return std::exp(state_[2]);
 }
@@ -145,8 +163,9 @@ double AdaptiveUnscentedKalman::measurement_sd_C() const {
 
 double AdaptiveUnscentedKalman::equilibrium_time_min() const {
     const double now_min = static_cast<double>(scans_) * options_.period_s / seconds_per_min;
-    const double rise = state_[1] - first_C_;
-    const double left = state_[1] - state_[0];
+    const double steady_state = steady_state_C();
+    const double rise = steady_state - first_C_;
+    const double left = steady_state - state_[0];
     if (rise == 0.0 || left / rise <= 0.05) return now_min;
     return now_min + time_constant_min() * std::log(left / (0.05 * rise));
 }

@@ -13,21 +13,21 @@ struct KalmanOptions {
     double period_s = 15.0;
     double initial_time_constant_min = 40.0;
     double initial_log_time_constant_sd = 0.8;
-    double initial_rise_C = 5.0;
-    double initial_rise_sd_C = 8.0;
+    double initial_slope_sd_C_per_min = 1.0;
     double measurement_sd_C = 0.06;         ///< start value; adapts
-    double equilibrium_walk_C = 0.002;      ///< process noise a step: lets slower modes in
-    double log_time_constant_walk = 0.003;  ///< the rate slows as fast modes die away
+    double slope_walk_share = 0.002;        ///< process noise a step, of the slope: lets other modes in
+    double log_time_constant_walk = 0.002;  ///< the rate slows as fast modes die away
     double forgetting = 0.99;  ///< of the adaptive noise estimate (Sage and Husa 1969), per sample
 
     Result<void> check() const;
 };
 
-/// One channel. State: temperature, equilibrium temperature, logarithm of the time constant;
-///     T' = E + (T - E) exp(-dt / tau),   E' = E,   log tau' = log tau,   y = T + noise.
-/// O(1) memory and work a sample. `scaled sigma points` as Julier and Uhlmann with alpha 1, kappa 0. The
-/// measurement noise adapts to the innovations. Its interval is a single exponential's: see the README for
-/// how often it holds.
+/// One channel. State: temperature T, slope D and logarithm of the time constant tau, which early samples see
+/// almost linearly; the equilibrium is E = T + D tau (with E itself as a state the filter locks on to early
+/// noise):
+///     T' = T + D tau (1 - exp(-dt/tau)),   D' = D exp(-dt/tau),   log tau' = log tau,   y = T + noise.
+/// O(1) memory and work a sample. Symmetric sigma points (Julier and Uhlmann 1997); the measurement noise
+/// adapts to the innovations. Its interval is a single exponential's: see the README for how often it holds.
 class AdaptiveUnscentedKalman {
   public:
     explicit AdaptiveUnscentedKalman(const KalmanOptions& options) : options_(options) {}
@@ -37,8 +37,8 @@ class AdaptiveUnscentedKalman {
 
     bool started() const { return started_; }
     double temperature_C() const { return state_[0]; }
-    double steady_state_C() const { return state_[1]; }
-    double steady_state_sd_C() const;
+    double steady_state_C() const { return settled().mean_C; }
+    double steady_state_sd_C() const { return settled().sd_C; }
     double time_constant_min() const;
     double measurement_sd_C() const;
     /// Since the first sample: when 95 % of the way from it to the steady state is done; the past if it is
@@ -51,6 +51,12 @@ class AdaptiveUnscentedKalman {
     using State = std::array<double, size>;
     using Covariance = std::array<std::array<double, size>, size>;
 
+    struct Settled {
+        double mean_C;
+        double sd_C;
+    };
+    Settled settled() const;  ///< the unscented transform of T + D tau
+    std::array<State, 2 * size> sigma_points() const;
     void start(double temperature_C);
     void predict();
     void update(double temperature_C);
