@@ -12,6 +12,11 @@ namespace {
 constexpr std::size_t fewest_samples = 8;
 constexpr double mad_of_unit_normal = 0.6744897501960817;
 
+/// False for NaN.
+bool within(double value, double lowest, double highest) {
+    return value >= lowest && value <= highest;
+}
+
 double median(std::vector<double> values) {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::ranges::nth_element(values, middle);
@@ -90,7 +95,7 @@ Result<void> DenoiseOptions::check() const {
     if (levels < 1 || levels > 12) {
         return fail(NextStep::refuse_input, fmt::format("levels = {}: must be 1 to 12", levels));
     }
-    if (!(resolution_C >= 0.0 && resolution_C <= 10.0)) {
+    if (!within(resolution_C, 0.0, 10.0)) {
         return fail(NextStep::refuse_input, fmt::format("resolution_C = {}: must be 0 to 10", resolution_C));
     }
     if (auto newest = check_span("newest", newest_span, newest_degree); !newest) return newest;

@@ -11,6 +11,11 @@ namespace {
 
 constexpr double sd_per_mad = 1.482602218505602;
 
+/// False for NaN.
+bool within(double value, double lowest, double highest) {
+    return value >= lowest && value <= highest;
+}
+
 double median_of(std::vector<double>& values) {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::ranges::nth_element(values, middle);
@@ -109,13 +114,12 @@ Result<void> OutlierOptions::check() const {
     if (half_width < 3 || half_width > 50) {
         return fail(NextStep::refuse_input, fmt::format("half_width = {}: must be 3 to 50", half_width));
     }
-    if (!(threshold >= 3.0 && threshold <= 100.0)) {
+    if (!within(threshold, 3.0, 100.0)) {
         return fail(NextStep::refuse_input, fmt::format("threshold = {}: must be 3 to 100", threshold));
     }
-    if (!(smallest_noise_sd_C > 0.0 && smallest_noise_sd_C <= 5.0)) {
-        return fail(
-            NextStep::refuse_input,
-            fmt::format("smallest_noise_sd_C = {}: must be above 0 and at most 5", smallest_noise_sd_C));
+    if (!within(smallest_noise_sd_C, 1e-6, 5.0)) {
+        return fail(NextStep::refuse_input,
+                    fmt::format("smallest_noise_sd_C = {}: must be 1e-6 to 5", smallest_noise_sd_C));
     }
     if (longest_spike < 1 || 2 * longest_spike >= half_width) {
         return fail(NextStep::refuse_input,

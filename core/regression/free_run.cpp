@@ -9,6 +9,11 @@
 namespace thermbal {
 namespace {
 
+/// False for NaN.
+bool within(double value, double lowest, double highest) {
+    return value >= lowest && value <= highest;
+}
+
 /// The newest lags() values, kept contiguous.
 class History {
   public:
@@ -59,7 +64,7 @@ FreeRun run(const SvrModel& model, const UnitScale& scale, std::span<const doubl
     while (result.temperature_C.size() < steps) {
         const double unit = model.predict_unit(history.newest());
         const double value_C = scale.to_C(unit);
-        if (!(value_C >= options.lowest_C && value_C <= options.highest_C)) {
+        if (!within(value_C, options.lowest_C, options.highest_C)) {
             result.leaves_range = true;
             return result;
         }
@@ -83,9 +88,8 @@ Result<void> FreeRunOptions::check() const {
             fmt::format("longest_run = {}: must be above twice settle_span and at most 1000000 samples",
                         longest_run));
     }
-    if (!(settle_C > 0.0 && settle_C <= 1.0)) {
-        return fail(NextStep::refuse_input,
-                    fmt::format("settle_C = {}: must be above 0 and at most 1", settle_C));
+    if (!within(settle_C, 1e-9, 1.0)) {
+        return fail(NextStep::refuse_input, fmt::format("settle_C = {}: must be 1e-9 to 1", settle_C));
     }
     if (!(lowest_C < highest_C)) {
         return fail(NextStep::refuse_input,

@@ -70,6 +70,7 @@ double feature_tolerance(double sigma) {
 
 std::vector<double> pivot_coefficients(const KernelFeatures& kernel, const Eigen::VectorXd& weights) {
     std::vector<Eigen::Index> pivots;
+    pivots.reserve(kernel.pivots.size());
     for (const std::size_t row : kernel.pivots)
         pivots.push_back(static_cast<Eigen::Index>(row / kernel.stride));
     const Eigen::MatrixXd lower = kernel.features(pivots, Eigen::all);

@@ -93,13 +93,12 @@ struct Candidate {
     TubeSolver::State rough_state;
 };
 
-/// A rough first fold so far above the bound that the fine one is above it, too. The margins are many times
-/// what the rough fit has been seen to be off by (tests/regression compares the choice with the whole grid's
-/// on many windows); on every few rows of a noisy window that is more than on all of them.
-bool is_out_of_the_running(double rough_mse, std::size_t stride, std::size_t folds, double bound) {
-    const double margin = stride == 1 ? 1.5 : 4.0;
+/// A rough first fold so far above the bound that the fine one is above it, too. The margin is many times
+/// what the rough fit has been seen to be off by (tests/regression compares the choice with the whole
+/// grid's; 1.5 fails there).
+bool is_out_of_the_running(double rough_mse, std::size_t folds, double bound) {
     const double rough_rmse = std::sqrt(rough_mse / static_cast<double>(folds));
-    return rough_rmse > margin * std::sqrt(bound) + rough_smoothing(bound);
+    return rough_rmse > 4.0 * std::sqrt(bound) + rough_smoothing(bound);
 }
 
 /// Cross-validation of every C at one sigma.
@@ -141,8 +140,7 @@ class SigmaColumn {
     /// The mean over folds, or nothing as soon as it is sure to be above `bound`: every fold only adds to it.
     Result<std::optional<double>> mean_mse(const Candidate& candidate, double bound,
                                            const Cancelled& cancelled) {
-        if (is_out_of_the_running(candidate.rough_mse, rough_.stride, folds_.size(), bound))
-            return std::nullopt;
+        if (is_out_of_the_running(candidate.rough_mse, folds_.size(), bound)) return std::nullopt;
         const double C = options_.C_grid[candidate.C_index];
         const auto count = static_cast<double>(folds_.size());
         double sum = fits(0).mse(C, on_all_rows(candidate.rough_state), refine);

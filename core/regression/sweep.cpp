@@ -11,6 +11,11 @@
 namespace thermbal {
 namespace {
 
+/// False for NaN.
+bool within(double value, double lowest, double highest) {
+    return value >= lowest && value <= highest;
+}
+
 Result<void> check_grid(const char* name, const std::vector<double>& grid) {
     if (grid.empty() || grid.size() > 64) {
         return fail(NextStep::refuse_input,
@@ -18,9 +23,9 @@ Result<void> check_grid(const char* name, const std::vector<double>& grid) {
     }
     for (std::size_t k = 0; k < grid.size(); ++k) {
         const bool ascends = k == 0 || grid[k] > grid[k - 1];
-        if (!(grid[k] > 0.0 && grid[k] <= 1e9 && ascends)) {
+        if (!within(grid[k], 1e-9, 1e9) || !ascends) {
             return fail(NextStep::refuse_input,
-                        fmt::format("{}[{}] = {}: must ascend, above 0 and at most 1e9", name, k, grid[k]));
+                        fmt::format("{}[{}] = {}: must ascend, 1e-9 to 1e9", name, k, grid[k]));
         }
     }
     return {};
@@ -86,11 +91,10 @@ Result<void> SweepOptions::check() const {
     if (folds < 2 || folds > 20) {
         return fail(NextStep::refuse_input, fmt::format("folds = {}: must be 2 to 20", folds));
     }
-    if (!(epsilon > 0.0 && epsilon <= 0.5)) {
-        return fail(NextStep::refuse_input,
-                    fmt::format("epsilon = {}: must be above 0 and at most 0.5", epsilon));
+    if (!within(epsilon, 1e-9, 0.5)) {
+        return fail(NextStep::refuse_input, fmt::format("epsilon = {}: must be 1e-9 to 0.5", epsilon));
     }
-    if (!(solver_tolerance >= 1e-8 && solver_tolerance <= 0.1)) {
+    if (!within(solver_tolerance, 1e-8, 0.1)) {
         return fail(NextStep::refuse_input,
                     fmt::format("solver_tolerance = {}: must be 1e-8 to 0.1", solver_tolerance));
     }

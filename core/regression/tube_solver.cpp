@@ -181,7 +181,7 @@ void TubeSolver::centre_undetermined_bias() {
         if (slopes_(i) == 0.0) highest = std::min(highest, to_lower_edge);
         if (slopes_(i) > 0.0) highest = std::min(highest, to_upper_edge);
     }
-    if (!(std::isfinite(lowest) && std::isfinite(highest) && lowest < highest)) return;
+    if (std::isinf(lowest) || std::isinf(highest) || lowest >= highest) return;
     const double move = 0.5 * (lowest + highest);
     state_.bias += move;
     residuals_.array() -= move;
