@@ -94,8 +94,11 @@ std::string status_text(const json& status) {
         facts.add("time", fmt::format("{} min, {} scans", fixed(number(test, "time_min"), 2),
                                       whole(number(test, "scans"))));
         facts.add("declared", whole(number(test, "declared_channels")) + " channels");
-        facts.add("waiting for", joined(list(test, "waiting")));
-        facts.add("reason", text(test, "reason"));
+        if (const std::string reason = text(test, "reason"); reason.starts_with("waiting for ")) {
+            facts.add("waiting for", joined(list(test, "waiting")));
+        } else {
+            facts.add("reason", reason);
+        }
         if (const auto at_min = number(test, "identified_at_min")) {
             facts.add("identified", fmt::format("at {:.2f} min, took {} s", *at_min,
                                                 fixed(number(test, "identification_s"), 2)));
@@ -133,8 +136,12 @@ std::string channels_text(const json& channels) {
                      {"state"}});
     for (const json& channel : list(channels, "channels")) {
         const double n = number(channel, "n").value_or(0.0);
+        // Rise and rate are of the readings that were good: not of now when the newest is not.
+        const auto current = [&](const char* key) {
+            return text(channel, "quality") == "good" ? number(channel, key) : std::nullopt;
+        };
         table.add({text(channel, "channel"), text(channel, "place"), value_or_quality(channel, false),
-                   with_sign(number(channel, "rise_C"), 2), with_sign(number(channel, "rate_C_per_h"), 1),
+                   with_sign(current("rise_C"), 2), with_sign(current("rate_C_per_h"), 1),
                    n > 0 ? whole(n) : "-", fixed(number(channel, "window_rmse_C"), 3),
                    fixed(number(channel, "steady_state_C"), 2), interval_C(channel),
                    minutes(number(channel, "time_left_min")),
@@ -268,9 +275,10 @@ std::string health_text(const json& health) {
         TextTable units(
             {{"  unit"}, {"answering"}, {"round trip", true}, {"failures", true}, {"last error"}});
         for (const json& unit : list(line, "units")) {
+            const bool had_trouble = !flag(unit, "answering") || number(unit, "failures").value_or(0.0) > 0;
             units.add({fmt::format("  {}", text(unit, "unit")), flag(unit, "answering") ? "yes" : "NO",
                        fixed(number(unit, "round_trip_ms"), 1) + " ms", whole(number(unit, "failures")),
-                       or_dash(text(unit, "last_error"))});
+                       had_trouble ? or_dash(text(unit, "last_error")) : "-"});
         }
         whole_text += units.str();
     }

@@ -14,6 +14,11 @@ namespace {
 
 using nlohmann::json;
 
+/// Of readings that are not there any more nothing is said as if it were of now.
+std::optional<double> current(const json& channel, const char* key) {
+    return text(channel, "quality") == "good" ? number(channel, key) : std::nullopt;
+}
+
 bool is_declared(const json& channel) {
     return text(channel, "state") == "declared";
 }
@@ -63,11 +68,11 @@ std::vector<ChannelColumn> all_columns(bool unicode) {
         {"value C", 7, 7, 0, true, value_cell},
         {"rise C", 6, 6, 3, true,
          [](const json& channel, std::size_t) {
-             return ChannelCell{with_sign(number(channel, "rise_C"), 2), Ink::plain};
+             return ChannelCell{with_sign(current(channel, "rise_C"), 2), Ink::plain};
          }},
         {"C/h", 6, 6, 2, true,
          [](const json& channel, std::size_t) {
-             return ChannelCell{with_sign(number(channel, "rate_C_per_h"), 1), Ink::plain};
+             return ChannelCell{with_sign(current(channel, "rate_C_per_h"), 1), Ink::plain};
          }},
         {"trend", 7, 24, 5, false,
          [unicode](const json& channel, std::size_t width) {
@@ -90,7 +95,10 @@ std::vector<ChannelColumn> all_columns(bool unicode) {
              return ChannelCell{state_name(channel), ink_of_state(channel)};
          }},
         {"reason", 24, 200, 9, false,
-         [](const json& channel, std::size_t) { return ChannelCell{text(channel, "reason"), Ink::dim}; }},
+         [](const json& channel, std::size_t) {
+             const std::string reason = text(channel, "reason");
+             return ChannelCell{reason == text(channel, "state") ? std::string() : reason, Ink::dim};
+         }},
     };
 }
 
@@ -102,8 +110,12 @@ std::size_t total_width(const std::vector<ChannelColumn>& columns) {
 
 }  // namespace
 
-std::vector<ChannelColumn> fitting_columns(std::size_t width, bool unicode) {
+std::vector<ChannelColumn> fitting_columns(const json& channels, std::size_t width, bool unicode) {
     std::vector<ChannelColumn> columns = all_columns(unicode);
+    const bool has_places =
+        std::ranges::any_of(channels, [](const json& channel) { return !text(channel, "place").empty(); });
+    if (!has_places)
+        std::erase_if(columns, [](const ChannelColumn& column) { return column.title == "place"; });
     while (total_width(columns) > width) {
         const auto least = std::ranges::max_element(columns, {}, &ChannelColumn::rank);
         if (least->rank == 0) break;

@@ -26,7 +26,8 @@ struct ChannelColumn {
     std::function<ChannelCell(const nlohmann::json& channel, std::size_t width)> cell;
 };
 
-/// The columns that fit beside each other, one space between, widened to the room there is.
-std::vector<ChannelColumn> fitting_columns(std::size_t width, bool unicode);
+/// The columns that fit beside each other, one space between, widened to the room there is. `channels` is
+/// what they are to show: a column that says nothing of any channel is left out.
+std::vector<ChannelColumn> fitting_columns(const nlohmann::json& channels, std::size_t width, bool unicode);
 
 }  // namespace thermbal

@@ -38,6 +38,7 @@ Result<void> LiveFeed::fill() {
     if (!status) return std::unexpected(status.error());
     auto channels = client_->ask("channels", json::object(), answer_limit);
     if (!channels) return std::unexpected(channels.error());
+    older_ = client_->kept();
     auto events = client_->ask("events", {{"limit", most_events}}, answer_limit);
     if (!events) return std::unexpected(events.error());
     scene_.status = std::move(*status);
@@ -114,6 +115,9 @@ std::vector<Notification> LiveFeed::update() {
         auto next = client_->next(milliseconds(0));
         if (!next) lose(next.error());
         if (!next || !*next) break;
+        const bool is_older = older_ > 0;
+        if (is_older) --older_;
+        if (is_older && (*next)->topic != "event") continue;
         take(**next);
         scanned = scanned || (*next)->topic == "scan";
         identified = identified || (*next)->topic == "predictions";

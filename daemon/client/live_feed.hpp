@@ -26,7 +26,7 @@ class LiveFeed {
     int fd() const { return client_ ? client_->fd() : -1; }
     bool connected() const { return client_.has_value(); }
     /// Something has come already, whatever fd() says: update() is to be called at once.
-    bool pending() const { return client_ && client_->has_kept(); }
+    bool pending() const { return client_ && client_->kept() > 0; }
     const std::string& trouble() const { return trouble_; }
 
     /// Asks for the curve of the chosen channel.
@@ -48,6 +48,7 @@ class LiveFeed {
     std::string socket_;
     std::optional<SocketClient> client_;
     WatchScene scene_;
+    std::size_t older_ = 0;  ///< notifications that came before the scene was asked for
     std::optional<Clock::time_point> scanned_at_;
     Clock::time_point lost_at_;
     Clock::time_point tried_at_;

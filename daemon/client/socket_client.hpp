@@ -39,7 +39,7 @@ class SocketClient {
 
     /// Readable when there may be something for next(0); what is kept already does not make it readable.
     int fd() const { return fd_; }
-    bool has_kept() const { return !kept_.empty(); }
+    std::size_t kept() const { return kept_.size(); }
 
     SocketClient(SocketClient&& other) noexcept;
     SocketClient& operator=(SocketClient&& other) noexcept;

@@ -35,25 +35,29 @@ int print_notification(const Notification& notification, const WatchScene& scene
     return 0;
 }
 
+int print_newest_scan(const WatchScene& scene, bool as_json) {
+    return print_notification({"scan", scene.channels}, scene, as_json);
+}
+
 int watch_as_lines(LiveFeed& feed, bool as_json) {
     const auto say = [](std::string_view what) { fmt::print(stderr, "thermbalctl: {}\n", what); };
-    if (!as_json) {
-        const WatchScene& scene = feed.scene();
-        if (const int failed = print_text(scan_line(scene.channels, scene.status) + "\n"); failed != 0)
-            return failed;
-    }
-    for (;;) {
+    int failed = print_newest_scan(feed.scene(), as_json);
+    while (failed == 0) {
         std::array<pollfd, 2> waiting{{{feed.fd(), POLLIN, 0}, {STDOUT_FILENO, 0, 0}}};
         poll(waiting.data(), waiting.size(), feed.pending() ? 0 : feed.connected() ? -1 : 1000);
         if ((waiting[1].revents & POLLERR) != 0) return 0;  // whoever read the lines has gone
         const bool was_connected = feed.connected();
-        for (const Notification& notification : feed.update()) {
-            if (const int failed = print_notification(notification, feed.scene(), as_json); failed != 0)
-                return failed;
+        const auto taken = feed.update();
+        if (!was_connected && feed.connected()) {
+            say("connected again");
+            failed = print_newest_scan(feed.scene(), as_json);
+        }
+        for (const Notification& notification : taken) {
+            if (failed == 0) failed = print_notification(notification, feed.scene(), as_json);
         }
         if (was_connected && !feed.connected()) say(feed.trouble() + "; reconnecting");
-        if (!was_connected && feed.connected()) say("connected again");
     }
+    return failed;
 }
 
 // ---- a terminal ----

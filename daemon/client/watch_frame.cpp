@@ -122,7 +122,8 @@ void put_channel_row(Frame& frame, const std::vector<ChannelColumn>& columns, co
 }
 
 void put_channels(Frame& frame, const WatchScene& scene, std::size_t rows) {
-    const std::vector<ChannelColumn> columns = fitting_columns(frame.columns(), frame.unicode());
+    const json& channels = list(scene.channels, "channels");
+    const std::vector<ChannelColumn> columns = fitting_columns(channels, frame.columns(), frame.unicode());
     FrameLine titles = frame.line();
     for (std::size_t i = 0; i < columns.size(); ++i) {
         if (i > 0) titles.add(" ");
@@ -131,7 +132,6 @@ void put_channels(Frame& frame, const WatchScene& scene, std::size_t rows) {
                    Ink::dim);
     }
     frame.put(titles);
-    const json& channels = list(scene.channels, "channels");
     const std::size_t chosen = scene.chosen.value_or(0);
     const std::size_t first = chosen >= rows && rows > 0 ? chosen - rows + 1 : 0;
     for (std::size_t i = first; i < std::min(channels.size(), first + rows); ++i) {
@@ -243,8 +243,11 @@ void put_recent(Frame& frame, const json& channel, std::size_t height) {
 void put_curve(Frame& frame, const json& curve, std::size_t height) {
     const json& rmse_C = list(curve, "rmse_by_n_C");
     const Range range = range_of(rmse_C);
-    put_rule(frame, "RMSE against n, C");
-    if (!(range.low <= range.high)) return frame.put("  not swept on this window yet", Ink::dim);
+    if (!(range.low <= range.high)) {
+        put_rule(frame, "RMSE against n, C");
+        return frame.put("  not swept on this window yet", Ink::dim);
+    }
+    put_rule(frame, fmt::format("RMSE against n, C: minimum {:.3f} at n = {}", range.low, range.lowest + 1));
     const std::size_t step = step_for(rmse_C.size(), frame.columns());
     put_chart(frame, rmse_C, 0.0, range.high, height, step, range.lowest);
     FrameLine axis = frame.line();
@@ -266,9 +269,11 @@ void put_channel_facts(Frame& frame, const json& channel) {
     const bool declared = text(channel, "state") == "declared";
     const bool good = text(channel, "quality") == "good";
     fact("channel", fmt::format("{}  {}", text(channel, "channel"), text(channel, "place")), Ink::bold);
+    // Rise and rate are of the readings that were good: not of now when the newest is not.
+    const auto current = [&](const char* key) { return good ? number(channel, key) : std::nullopt; };
     fact("now",
          fmt::format("{}{}   rise {} C   {} C/h", value_or_quality(channel, false), good ? " C" : "",
-                     with_sign(number(channel, "rise_C"), 2), with_sign(number(channel, "rate_C_per_h"), 1)),
+                     with_sign(current("rise_C"), 2), with_sign(current("rate_C_per_h"), 1)),
          good ? Ink::plain : Ink::bad);
     fact("settles",
          fmt::format("{} C   90 % between {} and {} C", fixed(number(channel, "steady_state_C"), 2),

@@ -98,7 +98,8 @@ TEST_F(Frame, WideScreensShowPlaceAndReason) {
 
 TEST_F(Frame, NarrowScreensKeepNameValuePredictionAndState) {
     std::vector<std::string> titles;
-    for (const ChannelColumn& column : fitting_columns(30, true)) titles.push_back(column.title);
+    for (const ChannelColumn& column : fitting_columns(list(scene.channels, "channels"), 30, true))
+        titles.push_back(column.title);
     EXPECT_THAT(titles, ::testing::ElementsAre("", "value C", "steady", "state"));
 }
 

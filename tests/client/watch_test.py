@@ -50,9 +50,7 @@ class Piped(Watch):
 
     def test_json_is_one_document_a_line(self):
         made = self.start("--json")
-        while "subscribe" not in [method for method, _ in self.daemon.requests]:
-            time.sleep(0.01)
-        time.sleep(0.2)
+        self.assertEqual(json.loads(made.stdout.readline()), {"topic": "scan", "params": self.daemon.channels()})
         self.daemon.scan()
         line = json.loads(made.stdout.readline())
         self.assertEqual(line["topic"], "scan")
@@ -65,6 +63,7 @@ class Piped(Watch):
         self.assertIn("reconnecting", made.stderr.readline())
         self.daemon = FakeDaemon(self.socket)
         self.assertIn("connected again", made.stderr.readline())
+        self.assertTrue(made.stdout.readline().startswith("62.25 min "))
         self.daemon.scan()
         self.assertTrue(made.stdout.readline().startswith("62.50 min "))
 
