@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 namespace thermbal {
@@ -46,14 +47,20 @@ RmseMinimum find_minimum(std::span<const double> rmse_by_n_C, const CriterionOpt
     found.rmse_C = std::exp(y[lowest]);
     found.depth = median(y) - y[lowest];
     found.scatter = roughness(y);
-    found.at_edge = found.n == 1 || found.n == static_cast<int>(rmse_by_n_C.size());
-    found.clear = !found.at_edge && found.depth >= options.min_depth &&
+    const int before_the_edge = static_cast<int>(rmse_by_n_C.size()) - options.edge_lags;
+    double lowest_before = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < y.size() && lags[i] <= before_the_edge; ++i) lowest_before = std::min(lowest_before, y[i]);
+    found.falling = lowest_before - y[lowest];
+    found.clear = found.n > 1 && found.falling <= options.edge_fall && found.depth >= options.min_depth &&
                   found.depth >= options.min_depth_in_scatters * found.scatter;
     found.guard.passed = found.clear;
     found.guard.figures = fmt::format(
-        "RMSE {:.3f} C at n = {}{}, {:.2f} below the curve in ln (needed {:.2f} and {:.1f} x its scatter {:.2f})",
-        found.rmse_C, found.n, found.at_edge ? " (the edge of the curve)" : "", found.depth, options.min_depth,
-        options.min_depth_in_scatters, found.scatter);
+        "RMSE {:.3f} C at n = {}, {:.2f} below the curve in ln (needed {:.2f} and {:.1f} x its scatter {:.2f}), {}",
+        found.rmse_C, found.n, found.depth, options.min_depth, options.min_depth_in_scatters, found.scatter,
+        found.falling <= options.edge_fall
+            ? std::string("the curve has turned or levelled off")
+            : fmt::format("still falling at n = {} (by {:.2f}, allowed {:.2f})", rmse_by_n_C.size(), found.falling,
+                          options.edge_fall));
     return found;
 }
 

@@ -10,12 +10,17 @@ namespace thermbal {
 /// y(n) = ln RMSE(n), since an RMSE is known by its ratio and not by its difference:
 ///   scatter = 1.4826 * median |second difference of y| / sqrt(6)     the curve's own roughness
 ///   depth   = median(y) - min(y)                                     how far the minimum lies below the curve
-/// The minimum is clear when depth >= min_depth and depth >= min_depth_in_scatters * scatter, and when it is no edge
-/// of the curve (at n = 1 or at the largest n the curve has not been seen to rise again).
+///   falling = (lowest y up to edge_lags before the end) - min(y)     what the last lags still gain
+/// The minimum is clear when it is deep, in itself and against the scatter, when it is not at n = 1, and when the curve
+/// has turned or levelled off before its end (falling <= edge_fall): a curve that still falls at the largest n has its
+/// minimum somewhere beyond. On free runs that follow the filtered window down to its noise the curve ends in a floor,
+/// and which n of the floor is lowest means nothing: hence levelled off is enough.
 struct CriterionOptions {
-    double min_depth = 0.15;             ///< ln: the minimum is at most 86 % of the typical RMSE
-    double min_depth_in_scatters = 1.0;  ///< and stands out of the roughness
+    double min_depth = 0.05;             ///< ln: the minimum is at most 95 % of the typical RMSE
+    double min_depth_in_scatters = 1.5;  ///< and stands out of the roughness
     int min_lags = 8;                    ///< fewer usable n than this are no curve
+    int edge_lags = 5;
+    double edge_fall = 0.25;             ///< ln
 };
 
 struct RmseMinimum {
@@ -23,7 +28,7 @@ struct RmseMinimum {
     double rmse_C = 0.0;
     double depth = 0.0;
     double scatter = 0.0;
-    bool at_edge = false;
+    double falling = 0.0;
     bool clear = false;
     Guard guard;  ///< "clear_minimum", with the figures above
 };

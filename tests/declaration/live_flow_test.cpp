@@ -1,0 +1,108 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "declaration/declarations.hpp"
+#include "declaration/live_flow.hpp"
+#include "series/sample.hpp"
+
+namespace thermbal {
+namespace {
+
+bool never() { return false; }
+
+/// Sums of two exponentials with known steady states, room constant, 0.05 C noise, 0.1 C rounding.
+TestWindow exponentials(std::size_t scans, const std::vector<double>& rise_C, unsigned seed) {
+    std::mt19937 generator(seed);
+    std::normal_distribution<double> noise_C(0.0, 0.05);
+    const auto reading = [&](double value_C) { return std::round((value_C + noise_C(generator)) * 10.0) / 10.0; };
+    TestWindow window{0.0, 15.0, scans, {{"T1", {}}}, {}};
+    for (std::size_t c = 0; c < rise_C.size(); ++c) window.channels.push_back({"T" + std::to_string(c + 2), {}});
+    for (std::size_t k = 0; k < scans; ++k) {
+        const double t_min = 0.25 * static_cast<double>(k);
+        window.channels[0].values.push_back(reading(18.0));
+        for (std::size_t c = 0; c < rise_C.size(); ++c) {
+            const double fast_share = 0.2 + 0.1 * static_cast<double>(c % 5);
+            const double rise = fast_share * (1 - std::exp(-t_min / 9.0)) + (1 - fast_share) * (1 - std::exp(-t_min / 40.0));
+            window.channels[c + 1].values.push_back(reading(18.0 + rise_C[c] * rise));
+        }
+    }
+    return window;
+}
+
+FlowOptions quick() {
+    FlowOptions options;
+    options.sweep.last_lag = 12;
+    return options;
+}
+
+const std::vector<double> rises_C{9.0, 6.0, 4.0, 12.0, 7.0};
+
+TEST(LiveFlow, WhatItDeclaresIsTrueAndComesBeforeTheEnd) {
+    const TestWindow whole = exponentials(1600, rises_C, 3);
+    LiveFlow flow(quick());
+    Declarations declarations;
+    for (double until_min = 20.0; until_min <= 200.0 && declarations.declared_channels().size() < rises_C.size();
+         until_min += 10.0) {
+        const auto verdict = flow.identify(window_until(whole, until_min * 60.0), declarations.declared_channels(),
+                                           sequential_for, never);
+        if (verdict) declarations.update(verdict->channels, verdict->regime_since_min);
+    }
+    ASSERT_EQ(declarations.standing().size(), rises_C.size());
+    for (std::size_t c = 0; c < rises_C.size(); ++c) {
+        const ChannelVerdict& verdict = declarations.standing()[c];
+        EXPECT_TRUE(verdict.declared()) << verdict.channel << ": " << verdict.reason;
+        EXPECT_NEAR(verdict.steady_state_C, 18.0 + rises_C[c], 0.3) << verdict.channel;
+        EXPECT_LE(verdict.steady_state_low_C, verdict.steady_state_C);
+        EXPECT_GE(verdict.steady_state_high_C, verdict.steady_state_C);
+    }
+}
+
+TEST(LiveFlow, AVerdictDependsOnTheWindowAndNotOnWhatWasIdentifiedBefore) {
+    const TestWindow whole = exponentials(480, rises_C, 4);
+    FlowOptions options = quick();
+    options.sweep_when = SweepWhen::always;
+    LiveFlow grown(options), fresh(options);
+    for (double until_min = 40.0; until_min < 100.0; until_min += 20.0) {
+        ASSERT_TRUE(grown.identify(window_until(whole, until_min * 60.0), {}, sequential_for, never));
+    }
+    const TestWindow window = window_until(whole, 100.0 * 60.0);
+    const auto one = grown.identify(window, {}, sequential_for, never);
+    const auto other = fresh.identify(window, {}, sequential_for, never);
+    ASSERT_TRUE(one && other);
+    for (std::size_t c = 0; c < rises_C.size(); ++c) {
+        EXPECT_EQ(one->channels[c].steady_state_C, other->channels[c].steady_state_C);
+        EXPECT_EQ(one->channels[c].rmse_by_n_C, other->channels[c].rmse_by_n_C);
+        EXPECT_EQ(one->channels[c].svr.C, other->channels[c].svr.C);
+        EXPECT_EQ(one->channels[c].reason, other->channels[c].reason);
+    }
+}
+
+TEST(LiveFlow, DeadAndStuckChannelsHaveStatesOfTheirOwn) {
+    TestWindow window = exponentials(300, rises_C, 5);
+    std::ranges::fill(window.channels[2].values, no_value);
+    for (std::size_t k = 60; k < 300; ++k) window.channels[3].values[k] = window.channels[3].values[59];
+    const auto verdict = LiveFlow(quick()).identify(window, {}, sequential_for, never);
+    ASSERT_TRUE(verdict);
+    EXPECT_EQ(verdict->channels[1].state, ChannelState::dead);
+    EXPECT_EQ(verdict->channels[2].state, ChannelState::stuck) << verdict->channels[2].reason;
+    EXPECT_NE(verdict->channels[0].state, ChannelState::stuck);
+}
+
+TEST(LiveFlow, SaysWhatIsMissing) {
+    const TestWindow window = exponentials(40, rises_C, 6);
+    FlowOptions options = quick();
+    options.ambient = "T9";
+    const auto unknown = LiveFlow(options).identify(window, {}, sequential_for, never);
+    ASSERT_FALSE(unknown);
+    EXPECT_EQ(unknown.error().next, NextStep::refuse_input);
+    EXPECT_THAT(unknown.error().message, testing::HasSubstr("T9"));
+    const auto early = LiveFlow(quick()).identify(window, {}, sequential_for, never);
+    ASSERT_TRUE(early);
+    EXPECT_THAT(early->channels[0].reason, testing::HasSubstr("enough_samples: 9.8 min"));
+}
+
+}  // namespace
+}  // namespace thermbal
