@@ -44,7 +44,8 @@ ChannelModel::ChannelModel(const ReducedChannel& channel, const Basis& basis, co
     if (basis.has_ambient) {
         // In the end the channel follows the room: the gains' sum is one more observation.
         rows_.row(count).segment(1 + basis.grid(), basis.grid()).setOnes();
-        const double loss = prior.ambient_gain_loss_per_C * channel.range_C;
+        const double relative = prior.ambient_gain_loss_per_C * channel.range_C;
+        const double loss = relative / (1.0 + relative);
         value_[count] = 1.0 - loss;
         noise_variance_[count] = prior.ambient_gain_sd * prior.ambient_gain_sd + loss * loss;
         prior_mean_.segment(1 + basis.grid(), basis.grid()) = prior.ambient_mean;

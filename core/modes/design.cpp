@@ -180,6 +180,16 @@ TestWindow without_spikes(const TestWindow& window) {
     return clean;
 }
 
+double AmbientInput::range_C() const {
+    if (deviation_C.empty()) return 0.0;
+    std::vector<double> sorted = deviation_C;
+    std::sort(sorted.begin(), sorted.end());
+    const auto at = [&](double share) {
+        return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
+    };
+    return at(0.98) - at(0.02);
+}
+
 AmbientInput ambient_input(const TestWindow& window, std::string_view ambient, double tail_min) {
     AmbientInput input;
     const Column* column = ambient.empty() ? nullptr : window.channel(ambient);

@@ -16,6 +16,8 @@ struct AmbientInput {
     double reference_C = 0.0;
     double tail_C = 0.0;
     std::vector<double> deviation_C;  ///< one a scan
+
+    double range_C() const;  ///< between the 2 % and the 98 % quantile
 };
 
 AmbientInput ambient_input(const TestWindow& window, std::string_view ambient, double tail_min);

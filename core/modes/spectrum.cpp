@@ -211,6 +211,30 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
+/// The machine answers the room through the same modes as the heat: the response to the room is expected
+/// where the modes are found, slow ones most.
+void tie_ambient_to_modes(const std::vector<std::vector<Mode>>& states, const ModePrior& prior,
+                          const Basis& basis, const SpectrumOptions& options, BackgroundPrior& background) {
+    const double spacing = prior.log_tau[1] - prior.log_tau[0];
+    const double cell = std::log(basis.time_constant_min[1] / basis.time_constant_min[0]);
+    Eigen::VectorXd found = Eigen::VectorXd::Zero(basis.grid());
+    for (const std::vector<Mode>& modes : states) {
+        for (const Mode& mode : modes) {
+            const double log_tau = prior.log_tau[0] + spacing * mode.position;
+            for (Eigen::Index j = 0; j < basis.grid(); ++j) {
+                const double z =
+                    (std::log(basis.time_constant_min[static_cast<std::size_t>(j)]) - log_tau) / cell;
+                found[j] += std::exp(0.5 * mode.log_variance - 0.5 * z * z);
+            }
+        }
+    }
+    if (!(found.sum() > 0.0)) return;
+    found /= found.sum();
+    background.ambient_mean =
+        options.ambient_modes_share * found + (1.0 - options.ambient_modes_share) * background.ambient_mean;
+    background.ambient_variance = 0.5 * background.ambient_mean;
+}
+
 /// +1 if all channels warm, -1 if all cool, towards 0 as they disagree: then nothing is said about signs.
 double common_direction(const std::vector<ReducedChannel>& channels, const std::vector<std::size_t>& used) {
     constexpr double disagreement = 0.6;
@@ -344,24 +368,39 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
     BackgroundPrior background = background_prior(basis, options);
     const ModePrior modes_prior = mode_prior(prior, options);
     const double direction = common_direction(reduced, used);
-    std::vector<ChannelModel> models;
-    std::vector<WhitenedChannel> whitened;
     std::vector<Eigen::MatrixXd> responses;
+    std::vector<double> scales;
     for (const std::size_t i : used) {
-        const double scale = std::sqrt(reduced[i].range_C * reduced[i].range_C + common * common +
-                                       9.0 * reduced[i].sample_variance);
+        scales.push_back(std::sqrt(reduced[i].range_C * reduced[i].range_C + common * common +
+                                   9.0 * reduced[i].sample_variance));
         // After a regime change the channels start out of equilibrium: what they did from cold does not
         // apply.
-        background.responses = start_level_C.empty()
-                                   ? archived_responses(prior, window.channels[structural[i]].name)
-                                   : Eigen::MatrixXd();
-        const double mode_scale = background.responses.cols() > 0 ? options.archive_deviation * scale : scale;
-        models.emplace_back(reduced[i], basis, background, scale, mode_scale, functional);
-        responses.push_back(background.responses);
-        whitened.push_back(models.back().whitened(direction));
+        responses.push_back(start_level_C.empty()
+                                ? archived_responses(prior, window.channels[structural[i]].name)
+                                : Eigen::MatrixXd());
     }
-    const std::vector<std::vector<Mode>> states =
-        sample_modes(whitened, modes_prior, options.burn_in, options.draws, options.thinning, seed);
+    const auto modelled = [&] {
+        std::vector<ChannelModel> built;
+        for (std::size_t k = 0; k < used.size(); ++k) {
+            background.responses = responses[k];
+            const double mode_scale =
+                responses[k].cols() > 0 ? options.archive_deviation * scales[k] : scales[k];
+            built.emplace_back(reduced[used[k]], basis, background, scales[k], mode_scale, functional);
+        }
+        return built;
+    };
+    const auto sampled = [&](const std::vector<ChannelModel>& built, std::size_t kept) {
+        std::vector<WhitenedChannel> whitened;
+        for (const ChannelModel& model : built) whitened.push_back(model.whitened(direction));
+        return sample_modes(whitened, modes_prior, options.burn_in, kept, options.thinning, seed);
+    };
+    std::vector<ChannelModel> models = modelled();
+    if (room.measured && room.range_C() > options.ambient_matters_C) {
+        const std::vector<std::vector<Mode>> first = sampled(models, options.draws / 4);
+        tie_ambient_to_modes(first, modes_prior, basis, options, background);
+        models = modelled();
+    }
+    const std::vector<std::vector<Mode>> states = sampled(models, options.draws);
     const CurveGrid curves = curve_grid(basis, window, room, design, per_block, fine_grid);
 
     Random random(seed ^ 0x5DEECE66DULL);

@@ -41,6 +41,8 @@ struct SpectrumOptions {
     double ambient_gain_sd = 0.02;     ///< ... give or take this and the loss itself
     double ambient_centre_min = 60.0;  ///< median time constant of the response to the room, a priori
     double ambient_spread = 1.2;       ///< its spread, sd of log(tau)
+    double ambient_modes_share = 0.9;  ///< of the response to the room lies where the modes are
+    double ambient_matters_C = 0.4;    ///< a room that moves less is not worth a second pass
     double ambient_tail_min = 15.0;    ///< the ambient stays at its mean over the last so many minutes
 
     double archive_deviation =
