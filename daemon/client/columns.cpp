@@ -18,6 +18,7 @@ Character first_character(std::string_view text) {
     if (byte < 0x80) return {text.substr(0, 1), 1, byte >= 0x20 && byte != 0x7f};
     wchar_t wide = 0;
     std::mbstate_t state{};
+    // NOLINTNEXTLINE(concurrency-mt-unsafe): the state is our own
     const std::size_t length = std::mbrtowc(&wide, text.data(), text.size(), &state);
     if (length == 0 || length > text.size()) return {text.substr(0, 1), 1, false};
     const int width = wcwidth(wide);

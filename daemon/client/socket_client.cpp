@@ -113,7 +113,7 @@ Result<void> SocketClient::send_line(std::string line, Deadline deadline) const 
     std::string_view rest = line;
     while (!rest.empty()) {
         const ssize_t sent = send(fd_, rest.data(), rest.size(), MSG_NOSIGNAL);
-        if (sent > 0) {
+        if (sent >= 0) {
             rest.remove_prefix(static_cast<std::size_t>(sent));
         } else if (errno == EAGAIN) {
             if (!wait_for(fd_, POLLOUT, deadline)) return broken("thermbald takes no requests at the moment");
