@@ -22,7 +22,7 @@ struct SpectrumOptions {
 
     double expected_modes = 5.0;  ///< a priori, over the whole range
     double falloff_min = 60.0;    ///< beyond this time constant modes are rarer ...
-    double falloff_power = 2.5;   ///< ... as (falloff / tau)^power
+    double falloff_power = 2.0;   ///< ... as (falloff / tau)^power
     double mode_log_variance_mean =
         -3.0;  ///< of a mode's variance relative to the channel's squared scale, natural log
     double mode_log_variance_sd = 2.0;
@@ -32,7 +32,7 @@ struct SpectrumOptions {
 
     std::size_t background_points =
         28;                          ///< grid of the continuous background and of the response to the room
-    double background_level = 1e-4;  ///< variance of a background amplitude, relative to the squared scale
+    double background_level = 2e-4;  ///< variance of a background amplitude, relative to the squared scale
 
     // Friction falls as the machine warms: a channel follows the room the less, the more its own heat raises
     // it.
