@@ -134,7 +134,7 @@ struct Solved {
 };
 
 Solved levenberg_marquardt(const TestWindow& window, const AmbientInput& room, const Series& series,
-                           std::size_t per_block, Eigen::VectorXd log_tau) {
+                           std::size_t per_block, const Eigen::VectorXd& log_tau) {
     constexpr double fastest = -1.0;  // exp: 0.37 min
     constexpr double slowest = 7.3;   // exp: 1480 min
     Solved best{log_tau, evaluate(series, columns_at(window, room, log_tau, per_block))};

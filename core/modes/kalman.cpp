@@ -38,7 +38,8 @@ Result<void> KalmanOptions::check() const {
     if (!(initial_time_constant_min > 0.0))
         return refuse("initial_time_constant_min", initial_time_constant_min);
     if (!(measurement_sd_C > 0.0)) return refuse("measurement_sd_C", measurement_sd_C);
-    if (!(forgetting > 0.0 && forgetting < 1.0)) {
+    const bool fades = forgetting > 0.0 && forgetting < 1.0;
+    if (!fades) {
         return fail(NextStep::refuse_input,
                     fmt::format("forgetting is {}, accepted is between 0 and 1", forgetting));
     }

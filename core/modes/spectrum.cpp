@@ -280,6 +280,7 @@ Eigen::MatrixXd mode_curves(const std::vector<Mode>& modes, const ModePrior& pri
                             const std::vector<double>& minute) {
     const double spacing = prior.log_tau[1] - prior.log_tau[0];
     std::vector<double> tau;
+    tau.reserve(modes.size());
     for (const Mode& mode : modes) tau.push_back(std::exp(prior.log_tau[0] + spacing * mode.position));
     return step_columns(tau, minute);
 }
@@ -391,6 +392,7 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
     };
     const auto sampled = [&](const std::vector<ChannelModel>& built, std::size_t kept) {
         std::vector<WhitenedChannel> whitened;
+        whitened.reserve(built.size());
         for (const ChannelModel& model : built) whitened.push_back(model.whitened(direction));
         return sample_modes(whitened, modes_prior, options.burn_in, kept, options.thinning, seed);
     };
@@ -547,10 +549,12 @@ std::vector<double> predict_curve(const SpectrumEstimate& estimate, const Channe
     const Eigen::VectorXd of_basis = coefficients.head(basis.size());
     const Eigen::VectorXd of_modes = coefficients.tail(coefficients.size() - basis.size());
     std::vector<double> minute;
+    minute.reserve(time_s.size());
     for (const double time : time_s) minute.push_back((time - fitted.start_s) / seconds_per_min);
     const Eigen::VectorXd modes = step_columns(estimate.time_constant_min, minute) * of_modes;
     const Eigen::VectorXd past = inside * of_basis;
     std::vector<double> after;
+    after.reserve(time_s.size());
     for (const double time : time_s)
         after.push_back(std::max(0.0, (time - fitted.end_s()) / seconds_per_min));
     const Eigen::VectorXd future = future_design(basis, fitted, room, after) * of_basis;
