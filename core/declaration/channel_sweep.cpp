@@ -9,8 +9,10 @@
 namespace thermbal {
 namespace {
 
-/// When `curve_C` first reaches 95 % of the way from its first value to the steady state; NaN if it never does.
-double equilibrium_time_min(std::span<const double> curve_C, double steady_state_C, double start_s, double period_s) {
+/// When `curve_C` first reaches 95 % of the way from its first value to the steady state; NaN if it never
+/// does.
+double equilibrium_time_min(std::span<const double> curve_C, double steady_state_C, double start_s,
+                            double period_s) {
     const double start_C = curve_C.front();
     const double target_C = start_C + 0.95 * (steady_state_C - start_C);
     const double sign = steady_state_C >= start_C ? 1.0 : -1.0;
@@ -23,8 +25,8 @@ double equilibrium_time_min(std::span<const double> curve_C, double steady_state
     return no_value;
 }
 
-Result<SvrPrediction> predict_at(const LagFit& fit, std::span<const double> filtered_C, double start_s, double period_s,
-                                 const SweepOptions& options) {
+Result<SvrPrediction> predict_at(const LagFit& fit, std::span<const double> filtered_C, double start_s,
+                                 double period_s, const SweepOptions& options) {
     SvrPrediction svr{static_cast<int>(fit.n), no_value, no_value, fit.C, fit.sigma};
     if (!fit.settles) return svr;
     svr.steady_state_C = fit.steady_state_C;

@@ -1,11 +1,11 @@
 #include "declaration/criterion.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
+
+#include <fmt/format.h>
 
 namespace thermbal {
 namespace {
@@ -17,9 +17,17 @@ double median(std::vector<double> values) {
     return 0.5 * (*middle + *std::max_element(values.begin(), middle));
 }
 
+double upper_decile(std::vector<double> values) {
+    const auto rank =
+        values.begin() + static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(values.size() - 1));
+    std::ranges::nth_element(values, rank);
+    return *rank;
+}
+
 double roughness(const std::vector<double>& y) {
     std::vector<double> bends;
-    for (std::size_t i = 1; i + 1 < y.size(); ++i) bends.push_back(std::abs(y[i - 1] - 2.0 * y[i] + y[i + 1]));
+    for (std::size_t i = 1; i + 1 < y.size(); ++i)
+        bends.push_back(std::abs(y[i - 1] - 2.0 * y[i] + y[i + 1]));
     constexpr double sd_of_mad = 1.4826;
     return bends.empty() ? 0.0 : sd_of_mad * median(bends) / std::sqrt(6.0);
 }
@@ -37,30 +45,32 @@ RmseMinimum find_minimum(std::span<const double> rmse_by_n_C, const CriterionOpt
         lags.push_back(static_cast<int>(i) + 1);
     }
     if (static_cast<int>(y.size()) < options.min_lags) {
-        found.guard.figures =
-            fmt::format("{} of {} numbers of lags give a free run that stays bounded, {} are needed for a curve",
-                        y.size(), rmse_by_n_C.size(), options.min_lags);
+        found.guard.figures = fmt::format(
+            "{} of {} numbers of lags give a free run that stays bounded, {} are needed for a curve",
+            y.size(), rmse_by_n_C.size(), options.min_lags);
         return found;
     }
     const auto lowest = static_cast<std::size_t>(std::ranges::min_element(y) - y.begin());
     found.n = lags[lowest];
     found.rmse_C = std::exp(y[lowest]);
-    found.depth = median(y) - y[lowest];
+    found.depth = upper_decile(y) - y[lowest];
     found.scatter = roughness(y);
     const int before_the_edge = static_cast<int>(rmse_by_n_C.size()) - options.edge_lags;
     double lowest_before = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < y.size() && lags[i] <= before_the_edge; ++i) lowest_before = std::min(lowest_before, y[i]);
+    for (std::size_t i = 0; i < y.size() && lags[i] <= before_the_edge; ++i)
+        lowest_before = std::min(lowest_before, y[i]);
     found.falling = lowest_before - y[lowest];
     found.clear = found.n > 1 && found.falling <= options.edge_fall && found.depth >= options.min_depth &&
                   found.depth >= options.min_depth_in_scatters * found.scatter;
     found.guard.passed = found.clear;
     found.guard.figures = fmt::format(
-        "RMSE {:.3f} C at n = {}, {:.2f} below the curve in ln (needed {:.2f} and {:.1f} x its scatter {:.2f}), {}",
+        "RMSE {:.3f} C at n = {}, {:.2f} below the curve in ln (needed {:.2f} and {:.1f} x its scatter "
+        "{:.2f}), {}",
         found.rmse_C, found.n, found.depth, options.min_depth, options.min_depth_in_scatters, found.scatter,
         found.falling <= options.edge_fall
             ? std::string("the curve has turned or levelled off")
-            : fmt::format("still falling at n = {} (by {:.2f}, allowed {:.2f})", rmse_by_n_C.size(), found.falling,
-                          options.edge_fall));
+            : fmt::format("still falling at n = {} (by {:.2f}, allowed {:.2f})", rmse_by_n_C.size(),
+                          found.falling, options.edge_fall));
     return found;
 }
 

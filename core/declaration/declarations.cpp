@@ -1,10 +1,10 @@
 #include "declaration/declarations.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include <fmt/format.h>
 
 namespace thermbal {
 namespace {
@@ -13,15 +13,17 @@ namespace {
 std::optional<std::string> contradiction(const ChannelVerdict& declared, const ChannelVerdict& now,
                                          double regime_since_min) {
     if (regime_since_min > declared.declared_at_min) {
-        return fmt::format("the regime changed at {:.1f} min, after the declaration at {:.1f} min", regime_since_min,
-                           declared.declared_at_min);
+        return fmt::format("the regime changed at {:.1f} min, after the declaration at {:.1f} min",
+                           regime_since_min, declared.declared_at_min);
     }
     if (now.state == ChannelState::dead || now.state == ChannelState::stuck) return std::nullopt;
     // The declared interval and the one of a longer window may differ at their edges; they may not be apart.
-    if (now.steady_state_low_C > declared.steady_state_high_C || now.steady_state_high_C < declared.steady_state_low_C) {
-        return fmt::format("{:.2f} to {:.2f} C was declared at {:.1f} min, {:.2f} to {:.2f} C is known at {:.1f} min",
-                           declared.steady_state_low_C, declared.steady_state_high_C, declared.declared_at_min,
-                           now.steady_state_low_C, now.steady_state_high_C, now.window_end_min);
+    if (now.steady_state_low_C > declared.steady_state_high_C ||
+        now.steady_state_high_C < declared.steady_state_low_C) {
+        return fmt::format(
+            "{:.2f} to {:.2f} C was declared at {:.1f} min, {:.2f} to {:.2f} C is known at {:.1f} min",
+            declared.steady_state_low_C, declared.steady_state_high_C, declared.declared_at_min,
+            now.steady_state_low_C, now.steady_state_high_C, now.window_end_min);
     }
     return std::nullopt;
 }
@@ -65,6 +67,8 @@ std::set<std::string> Declarations::declared_channels() const {
     return channels;
 }
 
-void Declarations::restore(std::vector<ChannelVerdict> declared) { standing_ = std::move(declared); }
+void Declarations::restore(std::vector<ChannelVerdict> declared) {
+    standing_ = std::move(declared);
+}
 
 }  // namespace thermbal

@@ -13,7 +13,8 @@ struct Regime {
     std::string began_with;      ///< what changed there; empty at the start of the test
     double last_change_s = 0.0;  ///< of the inputs, also one that the estimate can carry across
     TestWindow window;
-    std::vector<double> start_level_C;  ///< of the channels at the start of the test; empty when it is this regime's
+    std::vector<double>
+        start_level_C;  ///< of the channels at the start of the test; empty when it is this regime's
 };
 Regime current_regime(const TestWindow& window, const FlowOptions& options);
 

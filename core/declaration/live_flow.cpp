@@ -1,10 +1,10 @@
 #include "declaration/live_flow.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "channel_sweep.hpp"
 #include "guards.hpp"
@@ -12,34 +12,42 @@
 namespace thermbal {
 
 Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::set<std::string>& settled,
-                                         const ParallelFor& parallel_for, const std::function<bool()>& cancelled) {
+                                         const ParallelFor& parallel_for,
+                                         const std::function<bool()>& cancelled) {
     if (!options_.ambient.empty() && window.channel(options_.ambient) == nullptr) {
-        return fail(NextStep::refuse_input, fmt::format("the ambient channel {} is not in the test", options_.ambient));
+        return fail(NextStep::refuse_input,
+                    fmt::format("the ambient channel {} is not in the test", options_.ambient));
     }
     const Regime regime = current_regime(window, options_);
     const TestWindow& since = regime.window;
-    WindowVerdict verdict{window.end_s() / 60.0, regime.since_s / 60.0, {}};
+    WindowVerdict verdict{window.end_s() / 60.0, regime.since_s / 60.0, {}, {}, {}};
 
     const auto& now = estimate(since, regime.start_level_C);
     std::vector<const SpectrumEstimate*> shorter;  // the same regime seen from a little earlier
     for (const double back : {1.0, 2.0}) {
-        const TestWindow before = window_until(since, since.end_s() - back * options_.guards.look_back_min * 60.0);
+        const TestWindow before =
+            window_until(since, since.end_s() - back * options_.guards.look_back_min * 60.0);
         const auto& estimated = estimate(before, regime.start_level_C);
-        if (estimated) shorter.push_back(&*estimated);
+        if (estimated) shorter.push_back(&estimated->estimate);
+    }
+    if (now) {
+        verdict.archive_dropped = now->contradiction.reason;
+        if (regime.began_with.empty()) verdict.spectrum = archived(now->estimate);
     }
 
     for (const Column& column : window.channels) {
         if (column.name == options_.ambient) continue;
         ChannelVerdict channel = begin_verdict(column, verdict.window_end_min);
         const Column& samples = *since.channel(column.name);
-        const Evidence evidence{since, samples, regime, now ? &*now : nullptr, shorter};
+        const Evidence evidence{since, samples, regime, now ? &now->estimate : nullptr, shorter};
         ask_samples(channel, evidence, options_);
         if (channel.state == ChannelState::measuring) {
             take_estimate(channel, evidence);
             ask_shared_modes(channel, evidence, options_);
         }
         if (!settled.contains(channel.channel) && sweep_is_wanted(channel)) {
-            const auto swept = sweep_channel(samples.values, since.start_s, since.period_s, options_, parallel_for, cancelled);
+            const auto swept = sweep_channel(samples.values, since.start_s, since.period_s, options_,
+                                             parallel_for, cancelled);
             if (cancelled()) return fail(NextStep::stop, "cancelled");
             ask_sweep(channel, swept, options_);
         }
@@ -52,25 +60,35 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
 
 bool LiveFlow::sweep_is_wanted(const ChannelVerdict& channel) const {
     switch (options_.sweep_when) {
-        case SweepWhen::always: return channel.state != ChannelState::dead;
-        case SweepWhen::needed: return channel.state == ChannelState::measuring && first_failed(channel.guards) == nullptr;
-        case SweepWhen::never: break;
+        case SweepWhen::always:
+            return channel.state != ChannelState::dead;
+        case SweepWhen::needed:
+            return channel.state == ChannelState::measuring && first_failed(channel.guards) == nullptr;
+        case SweepWhen::never:
+            break;
     }
     return false;
 }
 
-const Result<SpectrumEstimate>& LiveFlow::estimate(const TestWindow& regime,
+const Result<ArchivedEstimate>& LiveFlow::estimate(const TestWindow& regime,
                                                    const std::vector<double>& start_level_C) {
+    const auto compute = [&]() -> Result<ArchivedEstimate> {
+        if (options_.prior) {
+            return estimate_with_archive(regime, options_.ambient, *options_.prior, options_.spectrum,
+                                         options_.seed, start_level_C);
+        }
+        auto plain = estimate_spectrum(regime, options_.ambient, std::nullopt, options_.spectrum,
+                                       options_.seed, start_level_C);
+        if (!plain) return std::unexpected(plain.error());
+        return ArchivedEstimate{std::move(*plain), {}};
+    };
     const std::pair key{std::llround(regime.start_s * 1e3), regime.scans};
     const auto known = estimates_.find(key);
     if (known != estimates_.end()) return known->second;
     // Only windows up to two look-backs old are asked for again.
     constexpr std::size_t remembered = 64;
     while (estimates_.size() >= remembered) estimates_.erase(estimates_.begin());
-    return estimates_
-        .emplace(key, estimate_spectrum(regime, options_.ambient, options_.prior, options_.spectrum, options_.seed,
-                                        start_level_C))
-        .first->second;
+    return estimates_.emplace(key, compute()).first->second;
 }
 
 }  // namespace thermbal

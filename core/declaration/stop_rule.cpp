@@ -7,11 +7,16 @@ namespace thermbal {
 
 std::string_view to_string(ChannelState state) {
     switch (state) {
-        case ChannelState::measuring: return "measuring";
-        case ChannelState::declared: return "declared";
-        case ChannelState::barely_warming: return "barely_warming";
-        case ChannelState::stuck: return "stuck";
-        case ChannelState::dead: return "dead";
+        case ChannelState::measuring:
+            return "measuring";
+        case ChannelState::declared:
+            return "declared";
+        case ChannelState::barely_warming:
+            return "barely_warming";
+        case ChannelState::stuck:
+            return "stuck";
+        case ChannelState::dead:
+            return "dead";
     }
     return "measuring";
 }
@@ -24,13 +29,18 @@ StopDecision decide_stop(std::span<const ChannelVerdict> verdicts, const std::ve
         if (!required[i]) continue;
         const ChannelVerdict& verdict = verdicts[i];
         switch (verdict.state) {
-            case ChannelState::declared: ++declared; break;
-            case ChannelState::barely_warming: break;
+            case ChannelState::declared:
+                ++declared;
+                break;
+            case ChannelState::barely_warming:
+                break;
             case ChannelState::stuck:
             case ChannelState::dead:
                 broken.push_back(fmt::format("{} is {}", verdict.channel, to_string(verdict.state)));
                 [[fallthrough]];
-            case ChannelState::measuring: decision.waiting.push_back(verdict.channel); break;
+            case ChannelState::measuring:
+                decision.waiting.push_back(verdict.channel);
+                break;
         }
     }
     decision.stop = decision.waiting.empty() && declared > 0;

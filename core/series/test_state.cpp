@@ -39,8 +39,12 @@ std::optional<Value> value_in(const Table& table, std::string_view name) {
 
 }  // namespace
 
-std::string_view to_string(TestState state) { return name_in(state_names, state); }
-std::string_view to_string(ScanStatus status) { return name_in(scan_status_names, status); }
+std::string_view to_string(TestState state) {
+    return name_in(state_names, state);
+}
+std::string_view to_string(ScanStatus status) {
+    return name_in(scan_status_names, status);
+}
 
 std::optional<TestState> test_state_from_string(std::string_view name) {
     return value_in<TestState>(state_names, name);

@@ -145,7 +145,9 @@ class LockstepClock final : public Clock {
 
 }  // namespace
 
-std::int64_t real_monotonic_ns() { return read_ns(CLOCK_MONOTONIC); }
+std::int64_t real_monotonic_ns() {
+    return read_ns(CLOCK_MONOTONIC);
+}
 
 std::unique_ptr<Clock> system_clock() {
     return std::make_unique<SystemClock>();

@@ -1,18 +1,21 @@
 #include "offline.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "compute/earlier_tests.hpp"
 #include "compute/threads.hpp"
 #include "declaration/declarations.hpp"
 #include "declaration/stop_rule.hpp"
 #include "files.hpp"
+#include "report/spectrum_json.hpp"
 #include "report/verdict_json.hpp"
 #include "series/sample.hpp"
+#include "store/store.hpp"
 
 namespace thermbal {
 namespace {
@@ -24,14 +27,17 @@ int refused(const Error& error) {
     return error.next == NextStep::refuse_input ? 2 : 1;
 }
 
-bool not_cancelled() { return false; }
+bool not_cancelled() {
+    return false;
+}
 
 struct Input {
     TestWindow window;
     FlowOptions flow;
 };
 
-/// The recording on its own grid, and the live flow's options; everything that a person can have got wrong is said.
+/// The recording on its own grid, and the live flow's options; everything that a person can have got wrong is
+/// said.
 Result<Input> read_input(const OfflineOptions& options) {
     const auto text = read_file(options.file);
     if (!text) return std::unexpected(text.error());
@@ -39,16 +45,31 @@ Result<Input> read_input(const OfflineOptions& options) {
     if (!test) return std::unexpected(test.error());
     const double period_s = median_step_s(*test);
     if (period_s <= 0.0) {
-        return fail(NextStep::refuse_input, fmt::format("{}: one row only; expected a recorded test", options.file));
+        return fail(NextStep::refuse_input,
+                    fmt::format("{}: one row only; expected a recorded test", options.file));
     }
     Input input{to_window(*test, period_s), {}};
     input.flow.ambient = options.ambient == "none" ? "" : options.ambient;
     input.flow.tolerance_C = options.tolerance_C;
+    if (!options.archive.empty()) {
+        const auto database = Reader::open(options.archive);
+        if (!database) return std::unexpected(database.error());
+        auto earlier = prior_of_machine(*database, options.machine, input.flow.spectrum);
+        if (!earlier) return std::unexpected(earlier.error());
+        if (!earlier->prior) {
+            fmt::print(
+                stderr,
+                "thermbalctl: {}: no earlier test{} in it, going on without; a test that ends leaves one, "
+                "`thermbalctl learn` adds recordings\n",
+                options.archive, options.machine.empty() ? "" : " of " + options.machine);
+        }
+        input.flow.prior = std::move(earlier->prior);
+    }
     if (options.modes_only) input.flow.sweep_when = SweepWhen::never;
     if (!input.flow.ambient.empty() && input.window.channel(input.flow.ambient) == nullptr) {
         return fail(NextStep::refuse_input,
-                    fmt::format("{}: no column {}; name the ambient with --ambient, or --ambient none", options.file,
-                                input.flow.ambient));
+                    fmt::format("{}: no column {}; name the ambient with --ambient, or --ambient none",
+                                options.file, input.flow.ambient));
     }
     for (const std::string& channel : options.channels) {
         if (input.window.channel(channel) == nullptr) {
@@ -71,16 +92,17 @@ json channels_json(const OfflineOptions& options, const std::vector<ChannelVerdi
 }
 
 void print_table(const OfflineOptions& options, const std::vector<ChannelVerdict>& verdicts) {
-    fmt::print("{:<6} {:<14} {:>9} {:>4} {:>8} {:>9} {:>17} {:>9}  {}\n", "", "state", "declared", "n", "RMSE", "settles",
-               "90 % interval", "95 % at", "reason");
+    fmt::print("{:<6} {:<14} {:>9} {:>4} {:>8} {:>9} {:>17} {:>9}  {}\n", "", "state", "declared", "n",
+               "RMSE", "settles", "90 % interval", "95 % at", "reason");
     const auto number = [](double value, const char* unit, int digits) {
         return std::isfinite(value) ? fmt::format("{:.{}f} {}", value, digits, unit) : std::string("-");
     };
     for (const ChannelVerdict& v : verdicts) {
         if (!is_wanted(options, v.channel)) continue;
-        const std::string interval = std::isfinite(v.steady_state_low_C)
-                                         ? fmt::format("{:.2f} .. {:.2f} C", v.steady_state_low_C, v.steady_state_high_C)
-                                         : "-";
+        const std::string interval =
+            std::isfinite(v.steady_state_low_C)
+                ? fmt::format("{:.2f} .. {:.2f} C", v.steady_state_low_C, v.steady_state_high_C)
+                : "-";
         fmt::print("{:<6} {:<14} {:>9} {:>4} {:>8} {:>9} {:>17} {:>9}  {}\n", v.channel, to_string(v.state),
                    number(v.declared_at_min, "min", 1), v.n > 0 ? std::to_string(v.n) : "-",
                    number(v.window_rmse_C, "C", 3), number(v.steady_state_C, "C", 2), interval,
@@ -96,7 +118,8 @@ int run_identify(const OfflineOptions& options) {
     if (options.until_min) input->window = window_until(input->window, *options.until_min * 60.0);
     if (!options.modes_only) input->flow.sweep_when = SweepWhen::always;
     LiveFlow flow(input->flow);
-    const auto verdict = flow.identify(input->window, {}, parallel_on_threads(options.threads, false), not_cancelled);
+    const auto verdict =
+        flow.identify(input->window, {}, parallel_on_threads(options.threads, false), not_cancelled);
     if (!verdict) return refused(verdict.error());
     if (options.json) {
         fmt::print("{}\n", json{{"window_end_min", verdict->window_end_min},
@@ -110,6 +133,37 @@ int run_identify(const OfflineOptions& options) {
     return 0;
 }
 
+int run_learn(const LearnOptions& options) {
+    OfflineOptions one;
+    one.ambient = options.ambient;
+    auto store = Store::open(options.archive, {options.now_wall_ns, 0});
+    if (!store) return refused(store.error());
+    for (const std::string& file : options.files) {
+        one.file = file;
+        const auto input = read_input(one);
+        if (!input) return refused(input.error());
+        FlowOptions flow = input->flow;
+        flow.sweep_when = SweepWhen::never;
+        const auto verdict =
+            LiveFlow(flow).identify(input->window, {}, parallel_on_threads(1, false), not_cancelled);
+        if (!verdict) return refused(verdict.error());
+        if (!verdict->spectrum) {
+            return refused(
+                {NextStep::refuse_input,
+                 fmt::format("{}: the machine's inputs change during the test; expected one regime", file)});
+        }
+        const auto id = store->record_archive({.id = 0,
+                                               .machine = options.machine,
+                                               .test_id = {},
+                                               .created_wall_ns = options.now_wall_ns,
+                                               .spectrum_json = spectrum_to_json(*verdict->spectrum).dump()});
+        if (!id) return refused(id.error());
+        fmt::print("{}: {:.0f} min of {} are in {}\n", file, verdict->window_end_min,
+                   options.machine.empty() ? "a machine without name" : options.machine, options.archive);
+    }
+    return 0;
+}
+
 int run_replay(const OfflineOptions& options) {
     const auto input = read_input(options);
     if (!input) return refused(input.error());
@@ -117,16 +171,24 @@ int run_replay(const OfflineOptions& options) {
     LiveFlow flow(input->flow);
     Declarations declarations;
     json changes = json::array();
+    std::string archive_dropped;
     double stopped_at_min = no_value;
     StopDecision decision;
     const double end_min = input->window.end_s() / 60.0;
     const double first_min = input->window.start_s / 60.0;
-    for (double until_min = first_min + options.every_min; until_min <= end_min + 1e-9; until_min += options.every_min) {
+    for (double until_min = first_min + options.every_min; until_min <= end_min + 1e-9;
+         until_min += options.every_min) {
         const TestWindow window = window_until(input->window, until_min * 60.0);
-        const auto verdict = flow.identify(window, declarations.declared_channels(), parallel_for, not_cancelled);
+        const auto verdict =
+            flow.identify(window, declarations.declared_channels(), parallel_for, not_cancelled);
         if (!verdict && verdict.error().next == NextStep::refuse_input) return refused(verdict.error());
         if (!verdict) continue;
-        for (const DeclarationChange& change : declarations.update(verdict->channels, verdict->regime_since_min)) {
+        if (archive_dropped.empty() && !verdict->archive_dropped.empty()) {
+            archive_dropped = verdict->archive_dropped;
+            fmt::print(stderr, "thermbalctl: at {:.2f} min: {}\n", verdict->window_end_min, archive_dropped);
+        }
+        for (const DeclarationChange& change :
+             declarations.update(verdict->channels, verdict->regime_since_min)) {
             const bool declared = change.kind == DeclarationChange::Kind::declared;
             changes.push_back({{"at_min", verdict->window_end_min},
                                {"channel", change.channel},
@@ -137,7 +199,8 @@ int run_replay(const OfflineOptions& options) {
                            declared ? "declared" : "withdrawn", change.reason);
             }
         }
-        decision = decide_stop(declarations.standing(), std::vector<bool>(declarations.standing().size(), true));
+        decision =
+            decide_stop(declarations.standing(), std::vector<bool>(declarations.standing().size(), true));
         if (decision.stop) {
             stopped_at_min = verdict->window_end_min;
             break;
@@ -148,24 +211,28 @@ int run_replay(const OfflineOptions& options) {
     if (!decision.stop && !options.modes_only) {
         FlowOptions everything = input->flow;
         everything.sweep_when = SweepWhen::always;
-        const auto verdict = LiveFlow(everything).identify(input->window, declarations.declared_channels(), parallel_for, not_cancelled);
+        const auto verdict =
+            LiveFlow(everything)
+                .identify(input->window, declarations.declared_channels(), parallel_for, not_cancelled);
         for (ChannelVerdict& channel : last) {
             if (channel.declared() || !verdict) continue;
-            const auto whole = std::ranges::find(verdict->channels, channel.channel, &ChannelVerdict::channel);
+            const auto whole =
+                std::ranges::find(verdict->channels, channel.channel, &ChannelVerdict::channel);
             if (whole != verdict->channels.end() && !whole->declared()) channel = *whole;
         }
     }
     if (options.json) {
         fmt::print("{}\n", json{{"test_stopped_at_min", number_or_null(stopped_at_min)},
                                 {"reason", decision.reason},
+                                {"archive_dropped", archive_dropped},
                                 {"changes", std::move(changes)},
                                 {"channels", channels_json(options, last)}}
                                .dump(2));
     } else {
         print_table(options, last);
         fmt::print("{}\n", std::isfinite(stopped_at_min)
-                               ? fmt::format("test stopped at {:.2f} of {:.2f} min: {}", stopped_at_min, end_min,
-                                             decision.reason)
+                               ? fmt::format("test stopped at {:.2f} of {:.2f} min: {}", stopped_at_min,
+                                             end_min, decision.reason)
                                : fmt::format("test not stopped in {:.2f} min: {}", end_min, decision.reason));
     }
     return 0;

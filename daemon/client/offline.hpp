@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,8 +16,8 @@ struct OfflineOptions {
     std::string ambient = "T1";         ///< "none": no ambient channel
     std::vector<std::string> channels;  ///< only these are reported; empty: all
     std::optional<double> until_min;
-    std::string archive;                ///< database with earlier tests of the machine
-    std::string machine;                ///< whose earlier tests; empty: the newest of any
+    std::string archive;  ///< database with earlier tests of the machine
+    std::string machine;  ///< whose earlier tests; empty: the newest of any
     double tolerance_C = 0.2;
     double every_min = 2.0;
     int threads = 2;
@@ -26,6 +27,17 @@ struct OfflineOptions {
 
 /// `thermbalctl identify`: the live flow once, on the samples up to until_min. Returns the exit status.
 int run_identify(const OfflineOptions& options);
+
+struct LearnOptions {
+    std::vector<std::string> files;
+    std::string archive;
+    std::string machine;
+    std::string ambient = "T1";
+    std::int64_t now_wall_ns = 0;
+};
+
+/// `thermbalctl learn`: what complete recorded tests teach about a machine goes into an archive database.
+int run_learn(const LearnOptions& options);
 
 /// `thermbalctl replay`: the growing window as the daemon would have run it, to the stop of the test.
 int run_replay(const OfflineOptions& options);

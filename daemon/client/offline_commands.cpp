@@ -1,3 +1,4 @@
+#include <chrono>
 #include <memory>
 
 #include "commands.hpp"
@@ -48,6 +49,23 @@ void add_offline_commands(CLI::App& app, int& status) {
         ->capture_default_str()
         ->check(CLI::Range(0.01, 1e6));
     replay_command.callback([&status, replay] { status = run_replay(*replay); });
+
+    const auto learn = std::make_shared<LearnOptions>();
+    CLI::App& learn_command = *app.add_subcommand(
+        "learn", "put what complete recorded tests teach about a machine into an archive");
+    learn_command.group(group);
+    learn_command.add_option("FILE", learn->files, "recorded tests of the machine, measured to their end")
+        ->required();
+    learn_command.add_option("--archive", learn->archive, "database, made if it is not there")->required();
+    learn_command.add_option("--machine", learn->machine, "the machine's name");
+    learn_command.add_option("--ambient", learn->ambient, "channel that measures the room, or none")
+        ->capture_default_str();
+    learn_command.callback([&status, learn] {
+        learn->now_wall_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                 std::chrono::system_clock::now().time_since_epoch())
+                                 .count();
+        status = run_learn(*learn);
+    });
 }
 
 }  // namespace thermbal

@@ -1,17 +1,17 @@
 #include "compute/identifier.hpp"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <chrono>
 #include <utility>
+
+#include <sys/resource.h>
+#include <unistd.h>
 
 namespace thermbal {
 
 Identifier::Identifier(Identify identify, std::function<void(IdentificationResult)> done)
-    : identify_(std::move(identify)), done_(std::move(done)), thread_([this](const std::stop_token& stop) {
-          run(stop);
-      }) {}
+    : identify_(std::move(identify)),
+      done_(std::move(done)),
+      thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 Identifier::~Identifier() {
     cancel();

@@ -13,8 +13,8 @@ double number_from(const nlohmann::json& json, const char* key) {
 }
 
 ChannelState state_from(const std::string& name) {
-    for (const ChannelState state : {ChannelState::declared, ChannelState::barely_warming, ChannelState::stuck,
-                                     ChannelState::dead}) {
+    for (const ChannelState state :
+         {ChannelState::declared, ChannelState::barely_warming, ChannelState::stuck, ChannelState::dead}) {
         if (to_string(state) == name) return state;
     }
     return ChannelState::measuring;
@@ -79,7 +79,8 @@ Result<ChannelVerdict> verdict_from_json(const nlohmann::json& json) {
         verdict.equilibrium_time_high_min = number_from(json, "equilibrium_time_high_min");
         const nlohmann::json& svr = json.at("svr");
         verdict.svr = {svr.at("n").get<int>(), number_from(svr, "steady_state_C"),
-                       number_from(svr, "equilibrium_time_min"), number_from(svr, "C"), number_from(svr, "sigma")};
+                       number_from(svr, "equilibrium_time_min"), number_from(svr, "C"),
+                       number_from(svr, "sigma")};
         for (const nlohmann::json& guard : json.at("guards")) {
             verdict.guards.push_back({guard.at("name").get<std::string>(), guard.at("passed").get<bool>(),
                                       guard.at("figures").get<std::string>()});

@@ -323,8 +323,8 @@ Result<void> Store::withdraw_declaration(TestId id, std::string_view channel, st
         const auto position = channel_position(database, id, std::string(channel));
         if (!position) return std::unexpected(position.error());
         return database.run(
-            "UPDATE declarations SET withdrawn = ? WHERE test_id = ? AND channel = ? AND withdrawn = ''", reason, id,
-            *position);
+            "UPDATE declarations SET withdrawn = ? WHERE test_id = ? AND channel = ? AND withdrawn = ''",
+            reason, id, *position);
     });
 }
 

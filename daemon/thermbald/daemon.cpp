@@ -1,11 +1,11 @@
 #include "daemon.hpp"
 
-#include <fmt/format.h>
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "report/verdict_json.hpp"
 #include "service/notify.hpp"
@@ -13,8 +13,8 @@
 namespace thermbal {
 
 // The live flow:
-//   module -> scan -> store -> window -> (filter -> SVR sweep -> criterion, shared time constants -> interval:
-//   core's LiveFlow, on the identifier's thread) -> declaration -> stop rule -> stop
+//   module -> scan -> store -> window -> (filter -> SVR sweep -> criterion, shared time constants ->
+//   interval: core's LiveFlow, on the identifier's thread) -> declaration -> stop rule -> stop
 
 void Daemon::take_scan(const Scan& scan) {
     latest_ = scan;
@@ -23,7 +23,8 @@ void Daemon::take_scan(const Scan& scan) {
         grow_window(scan);
         if (identification_is_due(scan.scan)) {
             test_.submitted_scan = scan.scan;
-            identifier_->submit({generation_, scan.scan, test_.window, test_.declarations.declared_channels()});
+            identifier_->submit(
+                {generation_, scan.scan, test_.window, test_.declarations.declared_channels(), test_.flow});
         }
         if (over_time(scan)) {
             end_test(TestEvent::abort, fmt::format("longer than test.max_duration_min = {}",
@@ -39,9 +40,16 @@ void Daemon::take_identification(IdentificationResult result) {
     identification_s_.add(result.seconds);
     test_.identification_s = result.seconds;
     if (!result.verdict) {
-        spdlog::debug("identification at scan {}: {}", result.window_end_scan, result.verdict.error().message);
+        spdlog::debug("identification at scan {}: {}", result.window_end_scan,
+                      result.verdict.error().message);
     } else {
         test_.identified_scan = result.window_end_scan;
+        if (test_.archive_dropped.empty() && !result.verdict->archive_dropped.empty()) {
+            test_.archive_dropped = result.verdict->archive_dropped;
+            event("archive_dropped", test_.archive_dropped);
+        }
+        test_.spectrum = std::move(result.verdict->spectrum);
+        test_.spectrum_window_min = result.verdict->window_end_min;
         const auto changes =
             test_.declarations.update(result.verdict->channels, result.verdict->regime_since_min);
         record_changes(changes, result.window_end_scan);
@@ -54,14 +62,16 @@ void Daemon::take_identification(IdentificationResult result) {
 void Daemon::decide() {
     std::vector<bool> required;
     for (const ChannelVerdict& verdict : test_.declarations.standing()) {
-        const auto channel = std::ranges::find(options_.config.channels, verdict.channel, &ChannelConfig::name);
+        const auto channel =
+            std::ranges::find(options_.config.channels, verdict.channel, &ChannelConfig::name);
         required.push_back(channel != options_.config.channels.end() && channel->required);
     }
     test_.decision = decide_stop(test_.declarations.standing(), required);
     if (!test_.decision.stop || test_.state != TestState::running) return;
 
     test_.state = TestState::declared;
-    if (const auto stored = store_.set_state(test_.id, TestState::declared, now(), test_.decision.reason); !stored) {
+    if (const auto stored = store_.set_state(test_.id, TestState::declared, now(), test_.decision.reason);
+        !stored) {
         spdlog::error("{}", stored.error().message);
     }
     event("all_declared", test_.decision.reason);
@@ -72,8 +82,8 @@ void Daemon::act_on_declaration() {
     if (options_.config.test.keep_measuring) {
         event("keep_measuring", "the test goes on as configured, so that the prediction can be checked");
     } else {
-        // The machine first: should the daemon die between the two, the next one finds the test declared and stops the
-        // machine again, rather than finding it stopped and never asking.
+        // The machine first: should the daemon die between the two, the next one finds the test declared and
+        // stops the machine again, rather than finding it stopped and never asking.
         test_.end_reason = test_.decision.reason;
         carry_out_stop();
         end_test(TestEvent::stop, test_.decision.reason);
@@ -89,6 +99,7 @@ void Daemon::end_test(TestEvent how, const std::string& reason) {
     if (const auto stored = store_.set_state(test_.id, *state, now(), reason); !stored) {
         spdlog::error("the end of test {} is not stored yet: {}", test_.id, stored.error().message);
     }
+    archive_test();
     event(to_string(*state), reason);
     settle(test_.last_scan);
     server_.publish("status", status_json().value_or(nullptr));
@@ -111,23 +122,27 @@ void Daemon::grow_window(const Scan& scan) {
 
 bool Daemon::identification_is_due(std::int64_t scan) const {
     const double every = options_.config.identification.every_s / options_.config.test.period_s;
-    return static_cast<double>(scan - test_.submitted_scan) >= std::max(1.0, every) - 1e-9 && !identifier_->busy();
+    return static_cast<double>(scan - test_.submitted_scan) >= std::max(1.0, every) - 1e-9 &&
+           !identifier_->busy();
 }
 
 void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::int64_t window_end_scan) {
     std::vector<IdentificationRecord> records;
     for (const ChannelVerdict& verdict : test_.declarations.standing()) {
-        records.push_back({verdict.channel, window_end_scan, clock_.wall_ns(), verdict_to_json(verdict).dump()});
+        records.push_back(
+            {verdict.channel, window_end_scan, clock_.wall_ns(), verdict_to_json(verdict).dump()});
     }
     if (const auto stored = store_.record_identifications(test_.id, records); !stored) {
         spdlog::warn("an identification is not stored: {}", stored.error().message);
     }
     for (const DeclarationChange& change : changes) {
         if (change.kind == DeclarationChange::Kind::withdrawn) {
-            if (const auto stored = store_.withdraw_declaration(test_.id, change.channel, change.reason); !stored) {
+            if (const auto stored = store_.withdraw_declaration(test_.id, change.channel, change.reason);
+                !stored) {
                 spdlog::error("{}", stored.error().message);
             }
-            event("withdrawn", fmt::format("{}: the declaration is withdrawn: {}", change.channel, change.reason),
+            event("withdrawn",
+                  fmt::format("{}: the declaration is withdrawn: {}", change.channel, change.reason),
                   change.channel);
             continue;
         }
@@ -150,9 +165,9 @@ void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::
             spdlog::error("the declaration of {} is not stored: {}", verdict.channel, stored.error().message);
         }
         event("declared",
-              fmt::format("{} settles at {:.2f} C ({:.2f} to {:.2f} C), 95 % of the rise at {:.0f} min", verdict.channel,
-                          verdict.steady_state_C, verdict.steady_state_low_C, verdict.steady_state_high_C,
-                          verdict.equilibrium_time_min),
+              fmt::format("{} settles at {:.2f} C ({:.2f} to {:.2f} C), 95 % of the rise at {:.0f} min",
+                          verdict.channel, verdict.steady_state_C, verdict.steady_state_low_C,
+                          verdict.steady_state_high_C, verdict.equilibrium_time_min),
               verdict.channel);
         server_.publish("declaration", verdict_to_json(verdict));
     }

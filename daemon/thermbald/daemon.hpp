@@ -1,13 +1,13 @@
 #pragma once
 
-#include <systemd/sd-event.h>
-
 #include <cstdint>
 #include <deque>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include <systemd/sd-event.h>
 
 #include "acquisition/clock.hpp"
 #include "acquisition/line_reader.hpp"
@@ -34,19 +34,19 @@ struct DaemonOptions {
     bool exit_when_ended = false;  ///< leave the event loop when a test has ended
 };
 
-/// The daemon: one event loop that owns the store, the socket and the test; a thread a line; a thread that identifies.
-/// The live flow stands in take_scan and take_identification; everything else serves them.
+/// The daemon: one event loop that owns the store, the socket and the test; a thread a line; a thread that
+/// identifies. The live flow stands in take_scan and take_identification; everything else serves them.
 class Daemon {
   public:
-    /// Opens the database and the socket, takes up the test that was open when an earlier daemon ended, starts the
-    /// lines. `clock` outlives the daemon.
+    /// Opens the database and the socket, takes up the test that was open when an earlier daemon ended,
+    /// starts the lines. `clock` outlives the daemon.
     static Result<std::unique_ptr<Daemon>> create(DaemonOptions options, Clock& clock);
     ~Daemon();
     Daemon(const Daemon&) = delete;
     Daemon& operator=(const Daemon&) = delete;
 
-    /// Until SIGTERM or SIGINT (a running test stays open and is taken up at the next start), or with exit_when_ended
-    /// until the test has ended.
+    /// Until SIGTERM or SIGINT (a running test stays open and is taken up at the next start), or with
+    /// exit_when_ended until the test has ended.
     Result<void> run();
 
   private:
@@ -66,6 +66,12 @@ class Daemon {
         double identification_s = 0.0;
         std::string end_reason;
         int stop_attempts = 0;
+        std::string machine;
+        std::shared_ptr<const FlowOptions> flow;
+        std::string
+            archive_dropped;  ///< why the archive does not speak for this test, once it was contradicted
+        std::optional<ArchivedSpectrum> spectrum;
+        double spectrum_window_min = 0.0;
     };
 
     Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer server, HookRunner hooks);
@@ -86,6 +92,8 @@ class Daemon {
     void resume(ResumedTest resumed);
     void follow_grid(Grid grid, std::int64_t first_scan);
     void begin_window(double period_s);
+    void prepare_flow(const std::string& machine);
+    void archive_test();
 
     // The stop action (stop_action.cpp).
     void carry_out_stop();
@@ -94,7 +102,8 @@ class Daemon {
 
     // Storing, events (recording.cpp).
     void store_scan(const Scan& scan);
-    void event(std::string_view kind, const std::string& message, const std::optional<std::string>& channel = {});
+    void event(std::string_view kind, const std::string& message,
+               const std::optional<std::string>& channel = {});
     ScanRecord record_of(const Scan& scan) const;
     Moment now() const;
 
@@ -151,7 +160,7 @@ class Daemon {
     };
     Mailbox<LogLine> line_log_;
     std::vector<std::unique_ptr<ModbusLine>> lines_;
-    std::unique_ptr<Identifier> identifier_;           // its thread uses the mailboxes above
+    std::unique_ptr<Identifier> identifier_;            // its thread uses the mailboxes above
     std::vector<std::unique_ptr<LineReader>> readers_;  // last: their threads use lines and mailboxes
 };
 

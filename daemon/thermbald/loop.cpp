@@ -1,22 +1,22 @@
-#include <fmt/format.h>
-#include <spdlog/spdlog.h>
-#include <sys/signalfd.h>
-
 #include <algorithm>
 #include <csignal>
 #include <cstring>
 #include <utility>
 
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <sys/signalfd.h>
+
 #include "compute/threads.hpp"
 #include "config/load.hpp"
 #include "daemon.hpp"
-#include "flow_options.hpp"
 #include "service/notify.hpp"
 
 namespace thermbal {
 namespace {
 
-/// A scan whose line says nothing is closed this long after its period: the line's own bound ends before that.
+/// A scan whose line says nothing is closed this long after its period: the line's own bound ends before
+/// that.
 constexpr std::int64_t close_grace_ns = 20'000'000;
 
 Result<void> check(int code, std::string_view what) {
@@ -30,7 +30,8 @@ Result<std::unique_ptr<Daemon>> Daemon::create(DaemonOptions options, Clock& clo
     const Config& config = options.config;
     auto store = Store::open(config.store.path, {clock.wall_ns(), clock.monotonic_ns()});
     if (!store) return std::unexpected(store.error());
-    auto server = SocketServer::open({.path = config.service.socket, .operators_group = config.service.operators_group});
+    auto server = SocketServer::open(
+        {.path = config.service.socket, .operators_group = config.service.operators_group});
     if (!server) return std::unexpected(server.error());
     auto hooks = HookRunner::create();
     if (!hooks) return std::unexpected(hooks.error());
@@ -56,9 +57,14 @@ Daemon::Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer se
     }
     const Config& config = options_.config;
     identifier_ = std::make_unique<Identifier>(
-        [flow = LiveFlow(flow_options(config)), parallel = parallel_on_threads(config.identification.workers, true)](
+        [flow = std::optional<LiveFlow>(), options = std::shared_ptr<const FlowOptions>(),
+         parallel = parallel_on_threads(config.identification.workers, true)](
             const IdentificationJob& job, const std::function<bool()>& cancelled) mutable {
-            return flow.identify(job.window, job.settled, parallel, cancelled);
+            if (options != job.options) {
+                options = job.options;
+                flow.emplace(*options);
+            }
+            return flow->identify(job.window, job.settled, parallel, cancelled);
         },
         [this](IdentificationResult result) { identifications_.push(std::move(result)); });
     for (std::size_t i = 0; i < lines_.size(); ++i) {
@@ -77,7 +83,8 @@ Daemon::~Daemon() {
 Result<void> Daemon::attach() {
     if (auto made = check(sd_event_new(&loop_), "event loop"); !made) return made;
     const auto on_readable = [this](int fd, void (*handler)(Daemon&)) {
-        // sd-event hands one pointer on; the handler's own address travels in a small closure that the loop outlives.
+        // sd-event hands one pointer on; the handler's own address travels in a small closure that the loop
+        // outlives.
         struct Closure {
             Daemon* daemon;
             void (*handler)(Daemon&);
@@ -125,7 +132,8 @@ Result<void> Daemon::attach() {
         const auto leave = [](sd_event_source* source, const signalfd_siginfo*, void*) {
             return sd_event_exit(sd_event_source_get_event(source), 0);
         };
-        if (auto added = check(sd_event_add_signal(loop_, nullptr, signal, leave, nullptr), "signals"); !added) {
+        if (auto added = check(sd_event_add_signal(loop_, nullptr, signal, leave, nullptr), "signals");
+            !added) {
             return added;
         }
     }
@@ -133,8 +141,9 @@ Result<void> Daemon::attach() {
         static_cast<Daemon*>(self)->close_overdue_scans();
         return 0;
     };
-    if (auto added = check(sd_event_add_time(loop_, &close_timer_, CLOCK_BOOTTIME, UINT64_MAX, 1000, on_close_time, this),
-                           "timer");
+    if (auto added = check(
+            sd_event_add_time(loop_, &close_timer_, CLOCK_BOOTTIME, UINT64_MAX, 1000, on_close_time, this),
+            "timer");
         !added) {
         return added;
     }
@@ -146,8 +155,9 @@ Result<void> Daemon::run() {
     auto resumed = store_.resume();
     if (!resumed) return std::unexpected(resumed.error());
     if (store_.set_aside()) {
-        event("database_set_aside", fmt::format("the database was damaged; it is kept as {} and a new one is begun",
-                                                store_.set_aside()->string()));
+        event("database_set_aside",
+              fmt::format("the database was damaged; it is kept as {} and a new one is begun",
+                          store_.set_aside()->string()));
     }
     if (*resumed) {
         resume(std::move(**resumed));
@@ -156,9 +166,11 @@ Result<void> Daemon::run() {
             return std::unexpected(id.error());
         }
     } else {
-        follow_grid({clock_.monotonic_ns(), static_cast<std::int64_t>(options_.config.test.period_s * 1e9)}, 0);
+        follow_grid({clock_.monotonic_ns(), static_cast<std::int64_t>(options_.config.test.period_s * 1e9)},
+                    0);
     }
-    notify_ready(is_measuring(test_.state) ? fmt::format("test {} is running", test_.id) : "no test is running");
+    notify_ready(is_measuring(test_.state) ? fmt::format("test {} is running", test_.id)
+                                           : "no test is running");
     feed_watchdog();
     const auto ended = check(sd_event_loop(loop_), "event loop");
     notify_stopping(is_measuring(test_.state) ? "the running test goes on at the next start" : "");
@@ -168,7 +180,8 @@ Result<void> Daemon::run() {
 void Daemon::on_line_readings() {
     for (LineScan& reading : line_readings_.take()) {
         if (reading.generation == generation_) {
-            lateness_ms_.add(static_cast<double>(reading.started_ns - assembler_->grid().due_ns(reading.scan)) * 1e-6);
+            lateness_ms_.add(
+                static_cast<double>(reading.started_ns - assembler_->grid().due_ns(reading.scan)) * 1e-6);
         }
         assembler_->add(std::move(reading));
     }
@@ -177,10 +190,14 @@ void Daemon::on_line_readings() {
 
 void Daemon::close_overdue_scans() {
     const std::uint64_t generation = generation_;
-    for (const Scan& scan : assembler_->take_closed(clock_.monotonic_ns() - close_grace_ns, clock_.wall_ns() - close_grace_ns)) {
-        (scan.status == ScanStatus::missed ? scans_missed_ : scan.status == ScanStatus::late ? scans_late_ : scans_ok_)++;
+    for (const Scan& scan :
+         assembler_->take_closed(clock_.monotonic_ns() - close_grace_ns, clock_.wall_ns() - close_grace_ns)) {
+        (scan.status == ScanStatus::missed ? scans_missed_
+         : scan.status == ScanStatus::late ? scans_late_
+                                           : scans_ok_)++;
         take_scan(scan);
-        if (generation != generation_) break;  // a test began or ended on this scan: the others belong to the old grid
+        if (generation != generation_)
+            break;  // a test began or ended on this scan: the others belong to the old grid
     }
     last_progress_ns_ = real_monotonic_ns();
     if (options_.exit_when_ended && test_.id > 0 && !is_measuring(test_.state) && hooks_.running() == 0) {
@@ -195,7 +212,8 @@ void Daemon::on_identifications() {
 
 /// A silent line must not hold the others: the oldest open scan is closed when its period is over.
 void Daemon::arm_close_timer() {
-    const std::int64_t wait_ns = std::max<std::int64_t>(clock_.real_ns_until(assembler_->next_close_ns() + close_grace_ns), 0);
+    const std::int64_t wait_ns =
+        std::max<std::int64_t>(clock_.real_ns_until(assembler_->next_close_ns() + close_grace_ns), 0);
     std::uint64_t now_us = 0;
     sd_event_now(loop_, CLOCK_BOOTTIME, &now_us);
     sd_event_source_set_time(close_timer_, now_us + static_cast<std::uint64_t>(wait_ns) / 1000 + 1);

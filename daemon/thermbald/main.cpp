@@ -1,14 +1,14 @@
-#include <fmt/format.h>
-#include <spdlog/sinks/stdout_sinks.h>
-#include <spdlog/spdlog.h>
-
-#include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <spdlog/sinks/stdout_sinks.h>
+#include <spdlog/spdlog.h>
 
 #include "config/load.hpp"
 #include "daemon.hpp"
@@ -77,7 +77,8 @@ int refused(const Error& error) {
 
 int main(int argc, char** argv) {
     CLI::App app(
-        "Polls a temperature module during a thermal-balance test, declares where each channel will settle, and stops "
+        "Polls a temperature module during a thermal-balance test, declares where each channel will settle, "
+        "and stops "
         "the test.",
         "thermbald");
     Flags flags;
@@ -85,12 +86,15 @@ int main(int argc, char** argv) {
     app.add_option("--config", flags.config, "configuration file")->capture_default_str();
     app.add_flag("--check-config", flags.check, "check the configuration, print what is in effect, and end");
     app.add_option("--profiles", flags.profiles, "a further folder with module profiles, looked up first");
-    app.add_flag("--exit-when-ended", flags.exit_when_ended, "end when a test has ended (demonstrations, tests)");
+    app.add_flag("--exit-when-ended", flags.exit_when_ended,
+                 "end when a test has ended (demonstrations, tests)");
     CLI::Option_group& time = *app.add_option_group("time", "Faster than time, with a simulated module:");
     auto* scale = time.add_option("--time-scale", flags.time_scale, "run the clock so many times as fast")
                       ->check(CLI::Range(0.01, 100000.0));
-    time.add_option("--time-epoch-ns", flags.time_epoch_ns, "CLOCK_MONOTONIC at which the scaled time is 0")->needs(scale);
-    time.add_flag("--lockstep", flags.lockstep, "the next scan is due when the work of the last one is done")->excludes(scale);
+    time.add_option("--time-epoch-ns", flags.time_epoch_ns, "CLOCK_MONOTONIC at which the scaled time is 0")
+        ->needs(scale);
+    time.add_flag("--lockstep", flags.lockstep, "the next scan is due when the work of the last one is done")
+        ->excludes(scale);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
@@ -100,8 +104,9 @@ int main(int argc, char** argv) {
     auto config = load_config_file(flags.config, profiles_in(profile_folders(flags)));
     if (!config) return refused(config.error());
     if (flags.lockstep && config->lines.size() > 1) {
-        return refused({NextStep::refuse_input, fmt::format("{}: --lockstep needs a configuration with one line, found {}",
-                                                            flags.config, config->lines.size())});
+        return refused({NextStep::refuse_input,
+                        fmt::format("{}: --lockstep needs a configuration with one line, found {}",
+                                    flags.config, config->lines.size())});
     }
     if (flags.check) {
         fmt::print("{}", explain_config(*config));

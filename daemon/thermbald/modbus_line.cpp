@@ -1,8 +1,8 @@
 #include "modbus_line.hpp"
 
-#include <fmt/format.h>
-
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "serial/ports.hpp"
 
@@ -27,7 +27,8 @@ ModbusLine::ModbusLine(const Config& config, std::size_t line, std::function<std
         for (std::size_t c = 0; c < config.channels.size(); ++c) {
             const ChannelConfig& channel = config.channels[c];
             if (channel.unit == u) {
-                configured.channels.push_back({c, static_cast<std::size_t>(channel.input - 1), channel.offset_C});
+                configured.channels.push_back(
+                    {c, static_cast<std::size_t>(channel.input - 1), channel.offset_C});
             }
         }
         units_.push_back(std::move(configured));

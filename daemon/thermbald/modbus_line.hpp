@@ -28,13 +28,14 @@ struct LineHealth {
     std::vector<Unit> units;
 };
 
-/// A line of the configuration on a real link: one block read a unit, registers decoded by the unit's profile.
+/// A line of the configuration on a real link: one block read a unit, registers decoded by the unit's
+/// profile.
 class ModbusLine final : public Line {
   public:
     using Log = std::function<void(const std::string& message, bool is_trouble)>;
 
-    /// `line` is an index into config.lines. `log` is called on the line's thread when a unit falls silent or answers
-    /// again, not for every failure.
+    /// `line` is an index into config.lines. `log` is called on the line's thread when a unit falls silent or
+    /// answers again, not for every failure.
     ModbusLine(const Config& config, std::size_t line, std::function<std::int64_t()> real_ns, Log log);
 
     std::vector<ChannelSample> read_scan() override;

@@ -5,11 +5,14 @@
 
 namespace thermbal {
 
-Moment Daemon::now() const { return {clock_.wall_ns(), clock_.monotonic_ns()}; }
+Moment Daemon::now() const {
+    return {clock_.wall_ns(), clock_.monotonic_ns()};
+}
 
 ScanRecord Daemon::record_of(const Scan& scan) const {
-    ScanRecord record{scan.scan, scan.status, test_.grid.time_s(scan.scan), scan.due_ns, {}, {}, scan.wall_ns,
-                      scan.samples, {}};
+    ScanRecord record{scan.scan,    scan.status,  test_.grid.time_s(scan.scan),
+                      scan.due_ns,  {},           {},
+                      scan.wall_ns, scan.samples, {}};
     if (scan.status != ScanStatus::missed) {
         record.started_ns = scan.started_ns;
         record.finished_ns = scan.finished_ns;
@@ -32,20 +35,23 @@ void Daemon::store_scan(const Scan& scan) {
     commit_ms_.add(static_cast<double>(real_monotonic_ns() - started_ns) * 1e-6);
     if (stored) {
         unstored_.clear();
-        if (waiting_already) event("storage_back", fmt::format("{} scans kept in memory are stored now", records.size()));
+        if (waiting_already)
+            event("storage_back", fmt::format("{} scans kept in memory are stored now", records.size()));
         return;
     }
     if (stored.error().next == NextStep::refuse_input) {
         lost_scans_ += unstored_.size();
         unstored_.clear();
-        event("scan_refused", fmt::format("scan {} is refused by the database: {}", scan.scan, stored.error().message));
+        event("scan_refused",
+              fmt::format("scan {} is refused by the database: {}", scan.scan, stored.error().message));
     } else if (!waiting_already) {
-        spdlog::error("the database does not take scans: {}; they are kept in memory, up to {}", stored.error().message,
-                      most_unstored);
+        spdlog::error("the database does not take scans: {}; they are kept in memory, up to {}",
+                      stored.error().message, most_unstored);
     }
 }
 
-void Daemon::event(std::string_view kind, const std::string& message, const std::optional<std::string>& channel) {
+void Daemon::event(std::string_view kind, const std::string& message,
+                   const std::optional<std::string>& channel) {
     EventRecord record{.id = 0,
                        .test_id = test_.id > 0 ? std::optional(test_.id) : std::nullopt,
                        .wall_ns = clock_.wall_ns(),
@@ -53,15 +59,17 @@ void Daemon::event(std::string_view kind, const std::string& message, const std:
                        .kind = std::string(kind),
                        .channel = channel,
                        .message = message};
-    if (record.test_id) record.time_s = static_cast<double>(clock_.monotonic_ns() - test_.grid.start_ns) * 1e-9;
+    if (record.test_id)
+        record.time_s = static_cast<double>(clock_.monotonic_ns() - test_.grid.start_ns) * 1e-9;
     spdlog::info("{}: {}", kind, message);
     const auto id = store_.record_event(record);
     if (!id) spdlog::warn("an event is not stored: {}", id.error().message);
-    server_.publish("event", {{"id", id.value_or(0)},
-                              {"kind", kind},
-                              {"time_s", record.time_s ? nlohmann::json(*record.time_s) : nlohmann::json(nullptr)},
-                              {"channel", channel ? nlohmann::json(*channel) : nlohmann::json(nullptr)},
-                              {"message", message}});
+    server_.publish("event",
+                    {{"id", id.value_or(0)},
+                     {"kind", kind},
+                     {"time_s", record.time_s ? nlohmann::json(*record.time_s) : nlohmann::json(nullptr)},
+                     {"channel", channel ? nlohmann::json(*channel) : nlohmann::json(nullptr)},
+                     {"message", message}});
 }
 
 }  // namespace thermbal

@@ -1,8 +1,8 @@
-#include <fmt/format.h>
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include <fmt/format.h>
+#include <sys/resource.h>
 
 #include "daemon.hpp"
 #include "report/verdict_json.hpp"
@@ -12,7 +12,9 @@ namespace {
 
 using nlohmann::json;
 
-Result<json> bad_param(std::string_view what) { return fail(NextStep::refuse_input, std::string(what)); }
+Result<json> bad_param(std::string_view what) {
+    return fail(NextStep::refuse_input, std::string(what));
+}
 
 /// A string parameter; empty when it is not given.
 Result<std::string> text_param(const json& params, const char* key) {
@@ -25,7 +27,8 @@ Result<std::string> text_param(const json& params, const char* key) {
 Result<std::int64_t> integer_param(const json& params, const char* key, std::int64_t otherwise) {
     const auto found = params.find(key);
     if (found == params.end() || found->is_null()) return otherwise;
-    if (!found->is_number_integer()) return fail(NextStep::refuse_input, fmt::format("{}: expected an integer", key));
+    if (!found->is_number_integer())
+        return fail(NextStep::refuse_input, fmt::format("{}: expected an integer", key));
     return found->get<std::int64_t>();
 }
 
@@ -69,7 +72,8 @@ double first_good(const std::vector<double>& values) {
 json thinned(const std::vector<double>& values, std::size_t count) {
     json list = json::array();
     const std::size_t wanted = std::min(count, values.size());
-    for (std::size_t i = 0; i < wanted; ++i) list.push_back(number_or_null(values[(i + 1) * values.size() / wanted - 1]));
+    for (std::size_t i = 0; i < wanted; ++i)
+        list.push_back(number_or_null(values[(i + 1) * values.size() / wanted - 1]));
     return list;
 }
 
@@ -121,23 +125,25 @@ Result<json> Daemon::status_json() const {
                    {"last_scan_age_s", nullptr}};
     if (latest_) {
         const bool asked = latest_->status != ScanStatus::missed;
-        status["last_scan_age_s"] = now_s - static_cast<double>(asked ? latest_->started_ns : latest_->due_ns) * 1e-9;
+        status["last_scan_age_s"] =
+            now_s - static_cast<double>(asked ? latest_->started_ns : latest_->due_ns) * 1e-9;
         status["good_channels"] = std::ranges::count_if(latest_->samples, &Sample::good);
     }
     if (test_.id > 0) {
         std::size_t declared = 0;
-        for (const ChannelVerdict& verdict : test_.declarations.standing()) declared += verdict.declared() ? 1U : 0U;
-        status["test"] = {{"id", test_.id},
-                          {"name", test_.name},
-                          {"time_min", test_.grid.time_s(std::max<std::int64_t>(test_.last_scan, 0)) / 60.0},
-                          {"scans", test_.last_scan + 1},
-                          {"declared_channels", declared},
-                          {"waiting", test_.decision.waiting},
-                          {"reason", is_measuring(test_.state) ? test_.decision.reason : test_.end_reason},
-                          {"identified_at_min", test_.identified_scan
-                                                    ? json(test_.grid.time_s(*test_.identified_scan) / 60.0)
-                                                    : json(nullptr)},
-                          {"identification_s", test_.identification_s}};
+        for (const ChannelVerdict& verdict : test_.declarations.standing())
+            declared += verdict.declared() ? 1U : 0U;
+        status["test"] = {
+            {"id", test_.id},
+            {"name", test_.name},
+            {"time_min", test_.grid.time_s(std::max<std::int64_t>(test_.last_scan, 0)) / 60.0},
+            {"scans", test_.last_scan + 1},
+            {"declared_channels", declared},
+            {"waiting", test_.decision.waiting},
+            {"reason", is_measuring(test_.state) ? test_.decision.reason : test_.end_reason},
+            {"identified_at_min",
+             test_.identified_scan ? json(test_.grid.time_s(*test_.identified_scan) / 60.0) : json(nullptr)},
+            {"identification_s", test_.identification_s}};
     }
     return status;
 }
@@ -174,9 +180,10 @@ Result<json> Daemon::channels_json() const {
         }
         list.push_back(std::move(entry));
     }
-    return json{{"time_min", test_.id > 0 ? json(test_.grid.time_s(std::max<std::int64_t>(test_.last_scan, 0)) / 60.0)
-                                          : json(nullptr)},
-                {"channels", std::move(list)}};
+    return json{
+        {"time_min", test_.id > 0 ? json(test_.grid.time_s(std::max<std::int64_t>(test_.last_scan, 0)) / 60.0)
+                                  : json(nullptr)},
+        {"channels", std::move(list)}};
 }
 
 Result<json> Daemon::samples_json(const json& params) const {
@@ -191,13 +198,15 @@ Result<json> Daemon::samples_json(const json& params) const {
     if (!wanted->empty() && std::ranges::find(channels, *wanted, &ChannelConfig::name) == channels.end()) {
         return bad_param(fmt::format("channel: there is no {}", *wanted));
     }
-    const auto scans = store_.read().scans(test_.id, std::max<std::int64_t>(*from_scan, 0), *from_scan + *limit - 1);
+    const auto scans =
+        store_.read().scans(test_.id, std::max<std::int64_t>(*from_scan, 0), *from_scan + *limit - 1);
     if (!scans) return std::unexpected(scans.error());
     json rows = json::array();
     for (const ScanRecord& scan : *scans) {
         json samples = json::object();
         for (std::size_t i = 0; i < scan.samples.size() && i < channels.size(); ++i) {
-            if (wanted->empty() || channels[i].name == *wanted) samples[channels[i].name] = sample_json(scan.samples[i]);
+            if (wanted->empty() || channels[i].name == *wanted)
+                samples[channels[i].name] = sample_json(scan.samples[i]);
         }
         rows.push_back({{"scan", scan.scan},
                         {"time_s", scan.time_s},
@@ -228,7 +237,8 @@ Result<json> Daemon::curve_json(const json& params) const {
 
 Result<json> Daemon::predictions_json() const {
     json list = json::array();
-    for (const ChannelVerdict& verdict : test_.declarations.standing()) list.push_back(verdict_to_json(verdict));
+    for (const ChannelVerdict& verdict : test_.declarations.standing())
+        list.push_back(verdict_to_json(verdict));
     return json{{"test_stopped_at_min", is_measuring(test_.state) || test_.id == 0
                                             ? json(nullptr)
                                             : json(test_.grid.time_s(test_.last_scan) / 60.0)},
@@ -303,13 +313,15 @@ Result<json> Daemon::health_json() const {
 
 Result<json> Daemon::on_start(const json& params) {
     if (is_measuring(test_.state)) {
-        return bad_param(fmt::format("test {} \"{}\" is {}: stop it first", test_.id, test_.name, to_string(test_.state)));
+        return bad_param(
+            fmt::format("test {} \"{}\" is {}: stop it first", test_.id, test_.name, to_string(test_.state)));
     }
     const auto name = text_param(params, "name");
     const auto machine = text_param(params, "machine");
     if (!name || !machine) return std::unexpected(!name ? name.error() : machine.error());
     const TestConfig& defaults = options_.config.test;
-    const auto id = start_test(name->empty() ? defaults.name : *name, machine->empty() ? defaults.machine : *machine);
+    const auto id =
+        start_test(name->empty() ? defaults.name : *name, machine->empty() ? defaults.machine : *machine);
     if (!id) return std::unexpected(id.error());
     return json{{"test", *id}, {"state", to_string(test_.state)}};
 }

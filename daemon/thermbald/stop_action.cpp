@@ -8,10 +8,14 @@ namespace thermbal {
 void Daemon::carry_out_stop() {
     const StopConfig& stop = options_.config.stop;
     switch (stop.action) {
-        case StopConfig::Action::none: return;
+        case StopConfig::Action::none:
+            return;
         case StopConfig::Action::write_coil:
-        case StopConfig::Action::write_register: write_stop_register(); return;
-        case StopConfig::Action::command: break;
+        case StopConfig::Action::write_register:
+            write_stop_register();
+            return;
+        case StopConfig::Action::command:
+            break;
     }
     const Hook hook{.argv = stop.command,
                     .environment = {{"THERMBAL_TEST_ID", std::to_string(test_.id)},
@@ -31,26 +35,28 @@ void Daemon::write_stop_register() {
     const StopConfig& stop = options_.config.stop;
     ++test_.stop_attempts;
     const RegisterWrite write{stop.unit_id, stop.action == StopConfig::Action::write_coil,
-                              static_cast<std::uint16_t>(stop.address), static_cast<std::uint16_t>(stop.value)};
-    readers_[stop.line]->write(write, [this](Result<void> outcome) { stop_outcomes_.push(std::move(outcome)); });
+                              static_cast<std::uint16_t>(stop.address),
+                              static_cast<std::uint16_t>(stop.value)};
+    readers_[stop.line]->write(write,
+                               [this](Result<void> outcome) { stop_outcomes_.push(std::move(outcome)); });
 }
 
 /// A stop that did not reach the machine is tried again: the machine goes on running as long as it has not.
 void Daemon::take_stop_outcome(const Result<void>& outcome) {
     constexpr int most_attempts = 5;
     const StopConfig& stop = options_.config.stop;
-    const std::string what = fmt::format("{} {} of unit {} on line {} set to {}",
-                                         stop.action == StopConfig::Action::write_coil ? "coil" : "holding register",
-                                         stop.address, stop.unit_id, options_.config.lines[stop.line].link.name,
-                                         stop.value);
+    const std::string what =
+        fmt::format("{} {} of unit {} on line {} set to {}",
+                    stop.action == StopConfig::Action::write_coil ? "coil" : "holding register", stop.address,
+                    stop.unit_id, options_.config.lines[stop.line].link.name, stop.value);
     if (outcome) {
         event("stop_carried_out", what);
     } else if (test_.stop_attempts < most_attempts) {
         spdlog::warn("{}: {}; trying again", what, outcome.error().message);
         write_stop_register();
     } else {
-        event("stop_failed", fmt::format("{} failed {} times: {}; stop the machine by hand", what, most_attempts,
-                                         outcome.error().message));
+        event("stop_failed", fmt::format("{} failed {} times: {}; stop the machine by hand", what,
+                                         most_attempts, outcome.error().message));
     }
 }
 

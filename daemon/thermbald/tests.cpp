@@ -1,23 +1,28 @@
-#include <fmt/format.h>
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "compute/earlier_tests.hpp"
 #include "config/load.hpp"
 #include "daemon.hpp"
+#include "flow_options.hpp"
+#include "report/spectrum_json.hpp"
 #include "report/verdict_json.hpp"
 
 namespace thermbal {
 namespace {
 
-std::int64_t period_ns_of(double period_s) { return std::llround(period_s * 1e9); }
+std::int64_t period_ns_of(double period_s) {
+    return std::llround(period_s * 1e9);
+}
 
 std::string describe_source(const Config& config, const ChannelConfig& channel) {
     const UnitConfig& unit = config.units[channel.unit];
-    return fmt::format("line {}, unit {} (id {}), input {}", config.lines[unit.line].link.name, unit.name, unit.unit_id,
-                       channel.input);
+    return fmt::format("line {}, unit {} (id {}), input {}", config.lines[unit.line].link.name, unit.name,
+                       unit.unit_id, channel.input);
 }
 
 }  // namespace
@@ -34,7 +39,8 @@ Result<TestId> Daemon::start_test(const std::string& name, const std::string& ma
                       .boot_id = options_.boot_id,
                       .channels = {}};
     for (const ChannelConfig& channel : config.channels) {
-        record.channels.push_back({channel.name, channel.role == ChannelConfig::Role::ambient ? "ambient" : "structure",
+        record.channels.push_back({channel.name,
+                                   channel.role == ChannelConfig::Role::ambient ? "ambient" : "structure",
                                    channel.place, channel.required, describe_source(config, channel)});
     }
     const auto id = store_.begin_test(record);
@@ -48,18 +54,51 @@ Result<TestId> Daemon::start_test(const std::string& name, const std::string& ma
     test_.grid = {record.started.monotonic_ns, period_ns_of(record.period_s)};
     begin_window(record.period_s);
     follow_grid(test_.grid, 0);
-    event("started", fmt::format("test {} \"{}\" of {}", *id, name, machine.empty() ? "a machine without name" : machine));
+    prepare_flow(machine);
+    event("started", fmt::format("test {} \"{}\" of {}", *id, name,
+                                 machine.empty() ? "a machine without name" : machine));
     return id;
+}
+
+/// The live flow's options for this test, with what earlier tests of the machine say.
+void Daemon::prepare_flow(const std::string& machine) {
+    auto flow = std::make_shared<FlowOptions>(flow_options(options_.config));
+    test_.machine = machine;
+    if (!machine.empty()) {
+        auto earlier = prior_of_machine(store_.read(), machine, flow->spectrum);
+        if (!earlier) {
+            event("archive_unread", earlier.error().message);
+        } else if (earlier->prior) {
+            flow->prior = std::move(earlier->prior);
+            event("archive", fmt::format("{} earlier tests of {} are the prior", earlier->tests, machine));
+        }
+    }
+    test_.flow = std::move(flow);
+}
+
+/// What this test has taught about the machine, for the next one. A short test taught too little.
+void Daemon::archive_test() {
+    constexpr double least_window_min = 60.0;
+    if (!test_.spectrum || test_.spectrum_window_min < least_window_min) return;
+    const ArchiveRecord record{.id = 0,
+                               .machine = test_.machine,
+                               .test_id = test_.id,
+                               .created_wall_ns = clock_.wall_ns(),
+                               .spectrum_json = spectrum_to_json(*test_.spectrum).dump()};
+    if (const auto stored = store_.record_archive(record); !stored) {
+        spdlog::warn("what test {} taught is not stored: {}", test_.id, stored.error().message);
+    }
 }
 
 void Daemon::begin_window(double period_s) {
     test_.window = TestWindow{0.0, period_s, 0, {}, {}};
-    for (const ChannelConfig& channel : options_.config.channels) test_.window.channels.push_back({channel.name, {}});
+    for (const ChannelConfig& channel : options_.config.channels)
+        test_.window.channels.push_back({channel.name, {}});
     newest_good_C_.assign(options_.config.channels.size(), no_value);
 }
 
-/// Goes on with a test that was open when the daemon ended: the same test, the scans that are stored, the grid where
-/// it is now. What lies between becomes missed scans.
+/// Goes on with a test that was open when the daemon ended: the same test, the scans that are stored, the
+/// grid where it is now. What lies between becomes missed scans.
 void Daemon::resume(ResumedTest resumed) {
     const StoredTest& stored = resumed.test;
     const TestRecord& record = stored.record;
@@ -75,15 +114,18 @@ void Daemon::resume(ResumedTest resumed) {
         const std::int64_t elapsed_ns = clock_.wall_ns() - record.started.wall_ns;
         test_.grid.start_ns = clock_.monotonic_ns() - elapsed_ns;
         if (test_.grid.scan_at(clock_.monotonic_ns()) <= last_scan) {
-            // The wall clock was set back meanwhile. Go on behind what is stored; how long the gap was is not known.
+            // The wall clock was set back meanwhile. Go on behind what is stored; how long the gap was is not
+            // known.
             test_.grid.start_ns = clock_.monotonic_ns() - (last_scan + 1) * test_.grid.period_ns;
         }
     }
 
     begin_window(record.period_s);
+    prepare_flow(record.machine);
     const auto position = [&](const std::string& name) {
         const auto& channels = options_.config.channels;
-        return static_cast<std::size_t>(std::ranges::find(channels, name, &ChannelConfig::name) - channels.begin());
+        return static_cast<std::size_t>(std::ranges::find(channels, name, &ChannelConfig::name) -
+                                        channels.begin());
     };
     for (const ScanRecord& scan : resumed.scans) {
         Scan again{.scan = scan.scan, .samples = std::vector<Sample>(options_.config.channels.size())};
@@ -104,8 +146,8 @@ void Daemon::resume(ResumedTest resumed) {
     test_.declarations.restore(std::move(verdicts));
     follow_grid(test_.grid, last_scan + 1);
     const std::int64_t missed = test_.grid.scan_at(clock_.monotonic_ns()) - last_scan - 1;
-    event("resumed", fmt::format("test {} \"{}\" goes on: {} scans are stored, about {} were missed", test_.id,
-                                 test_.name, last_scan + 1, std::max<std::int64_t>(missed, 0)));
+    event("resumed", fmt::format("test {} \"{}\" goes on: {} scans are stored, about {} were missed",
+                                 test_.id, test_.name, last_scan + 1, std::max<std::int64_t>(missed, 0)));
     if (test_.state == TestState::declared) act_on_declaration();
 }
 

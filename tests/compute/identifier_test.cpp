@@ -1,4 +1,4 @@
-#include <gtest/gtest.h>
+#include "compute/identifier.hpp"
 
 #include <atomic>
 #include <chrono>
@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-#include "compute/identifier.hpp"
+#include <gtest/gtest.h>
 
 namespace thermbal {
 namespace {
@@ -25,7 +25,8 @@ class Results {
     }
     bool wait_for(std::size_t count) const {
         const auto give_up = std::chrono::steady_clock::now() + 20s;
-        while (scans().size() < count && std::chrono::steady_clock::now() < give_up) std::this_thread::sleep_for(1ms);
+        while (scans().size() < count && std::chrono::steady_clock::now() < give_up)
+            std::this_thread::sleep_for(1ms);
         return scans().size() >= count;
     }
 
@@ -45,11 +46,11 @@ TEST(Identifier, TheNewestWindowWinsOverOneThatStillWaits) {
             return Result<WindowVerdict>(WindowVerdict{});
         },
         [&](IdentificationResult result) { results.add(std::move(result)); });
-    identifier.submit({1, 10, {}, {}});
+    identifier.submit({1, 10, {}, {}, {}});
     while (begun == 0) std::this_thread::yield();
     EXPECT_TRUE(identifier.busy());
-    identifier.submit({1, 20, {}, {}});
-    identifier.submit({1, 30, {}, {}});
+    identifier.submit({1, 20, {}, {}, {}});
+    identifier.submit({1, 30, {}, {}, {}});
     go = true;
     ASSERT_TRUE(results.wait_for(2));
     EXPECT_EQ(results.scans(), (std::vector<std::int64_t>{10, 30}));
@@ -65,10 +66,10 @@ TEST(Identifier, CancelEndsTheJobUnderWayAndNotTheNextOne) {
             return Result<WindowVerdict>(WindowVerdict{});
         },
         [&](IdentificationResult result) { results.add(std::move(result)); });
-    identifier.submit({1, 10, {}, {}});
+    identifier.submit({1, 10, {}, {}, {}});
     while (begun == 0) std::this_thread::yield();
     identifier.cancel();
-    identifier.submit({2, 20, {}, {}});
+    identifier.submit({2, 20, {}, {}, {}});
     ASSERT_TRUE(results.wait_for(1));
     EXPECT_EQ(results.scans(), (std::vector<std::int64_t>{20}));
 }
@@ -83,7 +84,7 @@ TEST(Identifier, EndsWhileAJobIsUnderWay) {
                 return Result<WindowVerdict>(WindowVerdict{});
             },
             [](const IdentificationResult&) { FAIL() << "a cancelled job has no result"; });
-        identifier.submit({1, 10, {}, {}});
+        identifier.submit({1, 10, {}, {}, {}});
         while (begun == 0) std::this_thread::yield();
     }
     EXPECT_EQ(begun, 1);

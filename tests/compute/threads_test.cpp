@@ -1,9 +1,9 @@
-#include <gtest/gtest.h>
+#include "compute/threads.hpp"
 
 #include <atomic>
 #include <vector>
 
-#include "compute/threads.hpp"
+#include <gtest/gtest.h>
 
 namespace thermbal {
 namespace {

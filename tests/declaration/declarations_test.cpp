@@ -1,6 +1,6 @@
-#include <gtest/gtest.h>
-
 #include "declaration/declarations.hpp"
+
+#include <gtest/gtest.h>
 
 namespace thermbal {
 namespace {

@@ -1,31 +1,38 @@
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
+#include "declaration/live_flow.hpp"
 
 #include <cmath>
 #include <random>
 
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
 #include "declaration/declarations.hpp"
-#include "declaration/live_flow.hpp"
 #include "series/sample.hpp"
 
 namespace thermbal {
 namespace {
 
-bool never() { return false; }
+bool never() {
+    return false;
+}
 
 /// Sums of two exponentials with known steady states, room constant, 0.05 C noise, 0.1 C rounding.
 TestWindow exponentials(std::size_t scans, const std::vector<double>& rise_C, unsigned seed) {
     std::mt19937 generator(seed);
     std::normal_distribution<double> noise_C(0.0, 0.05);
-    const auto reading = [&](double value_C) { return std::round((value_C + noise_C(generator)) * 10.0) / 10.0; };
+    const auto reading = [&](double value_C) {
+        return std::round((value_C + noise_C(generator)) * 10.0) / 10.0;
+    };
     TestWindow window{0.0, 15.0, scans, {{"T1", {}}}, {}};
-    for (std::size_t c = 0; c < rise_C.size(); ++c) window.channels.push_back({"T" + std::to_string(c + 2), {}});
+    for (std::size_t c = 0; c < rise_C.size(); ++c)
+        window.channels.push_back({"T" + std::to_string(c + 2), {}});
     for (std::size_t k = 0; k < scans; ++k) {
         const double t_min = 0.25 * static_cast<double>(k);
         window.channels[0].values.push_back(reading(18.0));
         for (std::size_t c = 0; c < rise_C.size(); ++c) {
             const double fast_share = 0.2 + 0.1 * static_cast<double>(c % 5);
-            const double rise = fast_share * (1 - std::exp(-t_min / 9.0)) + (1 - fast_share) * (1 - std::exp(-t_min / 40.0));
+            const double rise =
+                fast_share * (1 - std::exp(-t_min / 9.0)) + (1 - fast_share) * (1 - std::exp(-t_min / 40.0));
             window.channels[c + 1].values.push_back(reading(18.0 + rise_C[c] * rise));
         }
     }
@@ -44,10 +51,10 @@ TEST(LiveFlow, WhatItDeclaresIsTrueAndComesBeforeTheEnd) {
     const TestWindow whole = exponentials(1600, rises_C, 3);
     LiveFlow flow(quick());
     Declarations declarations;
-    for (double until_min = 20.0; until_min <= 200.0 && declarations.declared_channels().size() < rises_C.size();
-         until_min += 10.0) {
-        const auto verdict = flow.identify(window_until(whole, until_min * 60.0), declarations.declared_channels(),
-                                           sequential_for, never);
+    for (double until_min = 20.0;
+         until_min <= 200.0 && declarations.declared_channels().size() < rises_C.size(); until_min += 10.0) {
+        const auto verdict = flow.identify(window_until(whole, until_min * 60.0),
+                                           declarations.declared_channels(), sequential_for, never);
         if (verdict) declarations.update(verdict->channels, verdict->regime_since_min);
     }
     ASSERT_EQ(declarations.standing().size(), rises_C.size());

@@ -1,7 +1,7 @@
+#include "declaration/stop_rule.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include "declaration/stop_rule.hpp"
 
 namespace thermbal {
 namespace {

@@ -131,7 +131,7 @@ TEST_F(OpeningTest, ANewerDatabaseIsRefusedAndLeftAlone) {
     const auto before = contents(path);
     for (const auto& message :
          {Store::open(path, start).error().message, Reader::open(path).error().message}) {
-        EXPECT_THAT(message, HasSubstr("schema version 3"));
+        EXPECT_THAT(message, HasSubstr("schema version 4"));
         EXPECT_THAT(message, HasSubstr("newer thermbald"));
     }
     EXPECT_EQ(contents(path), before);

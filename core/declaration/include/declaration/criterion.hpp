@@ -6,21 +6,23 @@
 
 namespace thermbal {
 
-/// The paper asks for a "distinct minimum" of RMSE over the number of lags n and leaves open what that is. Ours, on
-/// y(n) = ln RMSE(n), since an RMSE is known by its ratio and not by its difference:
+/// The paper asks for a "distinct minimum" of RMSE over the number of lags n and leaves open what that is.
+/// Ours, on y(n) = ln RMSE(n), since an RMSE is known by its ratio and not by its difference:
 ///   scatter = 1.4826 * median |second difference of y| / sqrt(6)     the curve's own roughness
-///   depth   = median(y) - min(y)                                     how far the minimum lies below the curve
-///   falling = (lowest y up to edge_lags before the end) - min(y)     what the last lags still gain
-/// The minimum is clear when it is deep, in itself and against the scatter, when it is not at n = 1, and when the curve
-/// has turned or levelled off before its end (falling <= edge_fall): a curve that still falls at the largest n has its
-/// minimum somewhere beyond. On free runs that follow the filtered window down to its noise the curve ends in a floor,
-/// and which n of the floor is lowest means nothing: hence levelled off is enough.
+///   depth   = upper decile of y - min(y)                             how far the minimum lies below the
+///   curve falling = (lowest y up to edge_lags before the end) - min(y)     what the last lags still gain
+/// The minimum is clear when it is deep, in itself and against the scatter, when it is not at n = 1, and when
+/// the curve has turned or levelled off before its end (falling <= edge_fall): a curve that still falls at
+/// the largest n has its minimum somewhere beyond. On free runs that follow the filtered window down to its
+/// noise the curve ends in a floor, and which n of the floor is lowest means nothing: hence levelled off is
+/// enough.
 struct CriterionOptions {
-    double min_depth = 0.05;             ///< ln: the minimum is at most 95 % of the typical RMSE
-    double min_depth_in_scatters = 1.5;  ///< and stands out of the roughness
-    int min_lags = 8;                    ///< fewer usable n than this are no curve
+    double min_depth = 0.1;  ///< ln: the minimum is at most 90 % of what few lags give
+    double min_depth_in_scatters =
+        4.0;           ///< of 35 values of white noise the lowest lies 3.4 below the upper decile
+    int min_lags = 8;  ///< fewer usable n than this are no curve
     int edge_lags = 5;
-    double edge_fall = 0.25;             ///< ln
+    double edge_fall = 0.25;  ///< ln
 };
 
 struct RmseMinimum {
@@ -33,8 +35,8 @@ struct RmseMinimum {
     Guard guard;  ///< "clear_minimum", with the figures above
 };
 
-/// `rmse_by_n_C[i]` belongs to n = i + 1; a value that is not finite and positive (a free run that diverged) counts as
-/// worse than any other.
+/// `rmse_by_n_C[i]` belongs to n = i + 1; a value that is not finite and positive (a free run that diverged)
+/// counts as worse than any other.
 RmseMinimum find_minimum(std::span<const double> rmse_by_n_C, const CriterionOptions& options);
 
 }  // namespace thermbal

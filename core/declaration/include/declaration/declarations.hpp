@@ -17,13 +17,13 @@ struct DeclarationChange {
     std::string reason;
 };
 
-/// The declarations of a test so far. A declaration stands with the figures of the window that it was made on, until
-/// later samples contradict it: the machine's regime changed after it, or what is known now excludes what was
-/// declared then. It is then withdrawn, and the channel is measured on.
+/// The declarations of a test so far. A declaration stands with the figures of the window that it was made
+/// on, until later samples contradict it: the machine's regime changed after it, or what is known now
+/// excludes what was declared then. It is then withdrawn, and the channel is measured on.
 class Declarations {
   public:
-    /// Takes the fresh verdicts of one window. `regime_since_min`: when the regime that the window is in began, on
-    /// the test's time; a declaration from before it does not stand.
+    /// Takes the fresh verdicts of one window. `regime_since_min`: when the regime that the window is in
+    /// began, on the test's time; a declaration from before it does not stand.
     std::vector<DeclarationChange> update(const std::vector<ChannelVerdict>& fresh, double regime_since_min);
 
     /// Declarations that an earlier life of the daemon made and stored.
@@ -32,7 +32,8 @@ class Declarations {
     /// The channels whose declaration stands.
     std::set<std::string> declared_channels() const;
 
-    /// The standing declarations and, of the other channels, the latest verdicts; in the order of the last update.
+    /// The standing declarations and, of the other channels, the latest verdicts; in the order of the last
+    /// update.
     const std::vector<ChannelVerdict>& standing() const { return standing_; }
 
   private:

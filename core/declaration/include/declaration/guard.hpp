@@ -8,7 +8,7 @@ namespace thermbal {
 
 /// The outcome of a named predicate: what it decided, and on which figures.
 struct Guard {
-    std::string name;     ///< "enough_samples", "clear_minimum", ...
+    std::string name;  ///< "enough_samples", "clear_minimum", ...
     bool passed = false;
     std::string figures;  ///< for a person: "half width 0.31 C, needed 0.20 C"
 };

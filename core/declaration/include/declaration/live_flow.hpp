@@ -15,6 +15,7 @@
 #include "filter/denoise.hpp"
 #include "filter/gaps.hpp"
 #include "filter/outliers.hpp"
+#include "modes/archive.hpp"
 #include "modes/regime.hpp"
 #include "modes/spectrum.hpp"
 #include "regression/sweep.hpp"
@@ -23,17 +24,21 @@
 namespace thermbal {
 
 struct GuardOptions {
-    double shortest_window_min = 20.0;    ///< of one regime
-    double after_change_min = 15.0;       ///< no declaration sooner after any change of the machine's inputs
-    double good_share = 0.8;              ///< of a channel's samples in the window
-    double look_back_min = 4.0;           ///< "stable": the window, one this much shorter, and one twice as much
-    double drift_in_tolerances = 0.75;    ///< how far the prediction may move over both
-    double slow_time_constants = 1.0;     ///< of the slowest supported time constant that must have been seen
-    double svr_agreement_C = 0.0;         ///< 0: the SVR's steady state is reported, it has no veto
-    double overshoot_C = 0.5;             ///< how far a settling channel may be predicted back below where it is
+    double shortest_window_min = 20.0;  ///< of one regime
+    double after_change_min = 15.0;     ///< no declaration sooner after any change of the machine's inputs
+    double newest_sample_min = 2.0;     ///< how long ago a channel's newest good sample may be
+    double room_step_C = 0.3;           ///< how far the room may be from where it was some minutes ago ...
+    double room_step_over_usual = 1.5;  ///< ... or this many times what is usual in this room
+    double good_share = 0.8;            ///< of a channel's samples in the window
+    double look_back_min = 4.0;  ///< "stable": the window, one this much shorter, and one twice as much
+    double drift_in_tolerances = 0.75;  ///< how far the prediction may move over both
+    double slow_time_constants = 1.0;   ///< of the slowest supported time constant that must have been seen
+    double share_of_rise = 0.65;        ///< of its way to the steady state that a channel must have gone
+    double svr_agreement_C = 0.0;       ///< 0: the SVR's steady state is reported, it has no veto
+    double overshoot_C = 0.5;  ///< how far a settling channel may be predicted back below where it is
     double barely_rise_in_tolerances = 1.0;
-    double stuck_min = 20.0;              ///< the very same reading for so long while the machine warms
-    double stuck_rise_C = 1.0;            ///< "warms": the median channel has risen this much in that time
+    double stuck_min = 20.0;    ///< the very same reading for so long or longer ...
+    double stuck_rise_C = 1.0;  ///< ... while the median channel moved this much
 };
 
 /// On which channels the SVR sweep, the costly step, is run.
@@ -55,7 +60,7 @@ struct FlowOptions {
     RegimeOptions regime;
     std::optional<SpectrumPrior> prior;  ///< what earlier tests of the machine say
     GuardOptions guards;
-    std::uint64_t seed = 1;     ///< of everything that is sampled; the same seed gives the same bits
+    std::uint64_t seed = 1;  ///< of everything that is sampled; the same seed gives the same bits
     SweepWhen sweep_when = SweepWhen::needed;
 };
 
@@ -63,19 +68,24 @@ struct FlowOptions {
 struct WindowVerdict {
     double window_end_min = 0.0;
     double regime_since_min = 0.0;  ///< when the regime began that the window ends in
+    std::string
+        archive_dropped;  ///< why the archive's prior was not used on this window; empty when it was, or none
+    std::optional<ArchivedSpectrum>
+        spectrum;  ///< what this test would leave for the archive if it ended here
     std::vector<ChannelVerdict> channels;
 };
 
-/// The live flow from the window to the verdict on each channel: what the daemon, `thermbalctl replay` and `identify`
-/// all run. A verdict depends on the window and the options and on nothing else; a LiveFlow only remembers what it has
-/// computed of shorter windows, so that a growing window costs less. One thread at a time.
+/// The live flow from the window to the verdict on each channel: what the daemon, `thermbalctl replay` and
+/// `identify` all run. A verdict depends on the window and the options and on nothing else; a LiveFlow only
+/// remembers what it has computed of shorter windows, so that a growing window costs less. One thread at a
+/// time.
 class LiveFlow {
   public:
     explicit LiveFlow(FlowOptions options) : options_(std::move(options)) {}
 
-    /// Errors: refuse_input when the window cannot be identified at all (no structural channel, unknown ambient),
-    /// retry when it is still too short for anything, stop when `cancelled` said so.
-    /// `settled` says of which channels the verdict is no longer asked: those with a standing declaration are still
+    /// Errors: refuse_input when the window cannot be identified at all (no structural channel, unknown
+    /// ambient), retry when it is still too short for anything, stop when `cancelled` said so. `settled` says
+    /// of which channels the verdict is no longer asked: those with a standing declaration are still
     /// estimated, so that it can be contradicted, but not swept again.
     Result<WindowVerdict> identify(const TestWindow& window, const std::set<std::string>& settled,
                                    const ParallelFor& parallel_for, const std::function<bool()>& cancelled);
@@ -84,10 +94,12 @@ class LiveFlow {
 
   private:
     bool sweep_is_wanted(const ChannelVerdict& channel) const;
-    const Result<SpectrumEstimate>& estimate(const TestWindow& regime, const std::vector<double>& start_level_C);
+    const Result<ArchivedEstimate>& estimate(const TestWindow& regime,
+                                             const std::vector<double>& start_level_C);
 
     FlowOptions options_;
-    std::map<std::pair<std::int64_t, std::size_t>, Result<SpectrumEstimate>> estimates_;  // by start and scans
+    std::map<std::pair<std::int64_t, std::size_t>, Result<ArchivedEstimate>>
+        estimates_;  // by start and scans
 };
 
 }  // namespace thermbal

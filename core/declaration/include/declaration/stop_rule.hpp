@@ -14,9 +14,9 @@ struct StopDecision {
     std::vector<std::string> waiting;  ///< required channels that are still measured
 };
 
-/// The test may end when every required channel is declared or barely warming. A required channel that is stuck or
-/// dead holds the test: its steady state is not known, and a person has to say what to do (mend it, or stop by hand).
-/// REQUIRES: required[i] belongs to verdicts[i].
+/// The test may end when every required channel is declared or barely warming. A required channel that is
+/// stuck or dead holds the test: its steady state is not known, and a person has to say what to do (mend it,
+/// or stop by hand). REQUIRES: required[i] belongs to verdicts[i].
 StopDecision decide_stop(std::span<const ChannelVerdict> verdicts, const std::vector<bool>& required);
 
 }  // namespace thermbal

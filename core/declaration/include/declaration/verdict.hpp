@@ -37,15 +37,18 @@ struct ChannelVerdict {
     int n = 0;
     double window_rmse_C = std::numeric_limits<double>::quiet_NaN();
     std::vector<double> rmse_by_n_C;  ///< [i] belongs to n = i + 1
-    double value_C = std::numeric_limits<double>::quiet_NaN();  ///< the filtered temperature at the window's end
+    double value_C =
+        std::numeric_limits<double>::quiet_NaN();  ///< the filtered temperature at the window's end
     double steady_state_C = std::numeric_limits<double>::quiet_NaN();
     double steady_state_low_C = std::numeric_limits<double>::quiet_NaN();  ///< central 90 % interval
     double steady_state_high_C = std::numeric_limits<double>::quiet_NaN();
-    double equilibrium_time_min = std::numeric_limits<double>::quiet_NaN();  ///< since the start, 95 % of the rise
+    double equilibrium_time_min =
+        std::numeric_limits<double>::quiet_NaN();  ///< since the start, 95 % of the rise
     double equilibrium_time_low_min = std::numeric_limits<double>::quiet_NaN();
     double equilibrium_time_high_min = std::numeric_limits<double>::quiet_NaN();
     SvrPrediction svr;
-    std::vector<Guard> guards;  ///< in the order in which they were asked; the first that failed is the reason
+    std::vector<Guard>
+        guards;  ///< in the order in which they were asked; the first that failed is the reason
     std::string reason;
 
     bool declared() const { return state == ChannelState::declared; }

@@ -6,8 +6,8 @@
 
 namespace thermbal {
 
-/// A test's life: idle -> running -> declared -> stopped, and aborted from running or declared. What is stored is
-/// never idle.
+/// A test's life: idle -> running -> declared -> stopped, and aborted from running or declared. What is
+/// stored is never idle.
 enum class TestState : std::uint8_t { idle, running, declared, stopped, aborted };
 
 enum class TestEvent : std::uint8_t {

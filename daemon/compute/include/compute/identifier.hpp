@@ -3,6 +3,7 @@
 #include <condition_variable>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <set>
@@ -17,24 +18,26 @@ namespace thermbal {
 
 /// One window to identify, and what came of it.
 struct IdentificationJob {
-    std::uint64_t generation = 0;     ///< of the test; a result of an earlier one is of no use any more
+    std::uint64_t generation = 0;  ///< of the test; a result of an earlier one is of no use any more
     std::int64_t window_end_scan = 0;
     TestWindow window;
-    std::set<std::string> settled;    ///< channels whose declaration stands
+    std::set<std::string> settled;               ///< channels whose declaration stands
+    std::shared_ptr<const FlowOptions> options;  ///< of the test; the same object for all its windows
 };
 struct IdentificationResult {
     std::uint64_t generation = 0;
     std::int64_t window_end_scan = 0;
-    double seconds = 0.0;             ///< how long it took
+    double seconds = 0.0;  ///< how long it took
     Result<WindowVerdict> verdict;
 };
 
-/// Identifies beside the scans: one job at a time on a thread of its own, the newest window first. A window that is
-/// still waiting when a newer one comes is dropped; one under way is finished unless cancel() is called.
+/// Identifies beside the scans: one job at a time on a thread of its own, the newest window first. A window
+/// that is still waiting when a newer one comes is dropped; one under way is finished unless cancel() is
+/// called.
 class Identifier {
   public:
-    using Identify =
-        std::function<Result<WindowVerdict>(const IdentificationJob& job, const std::function<bool()>& cancelled)>;
+    using Identify = std::function<Result<WindowVerdict>(const IdentificationJob& job,
+                                                         const std::function<bool()>& cancelled)>;
 
     /// `done` is called on the identifier's thread.
     Identifier(Identify identify, std::function<void(IdentificationResult)> done);

@@ -29,7 +29,7 @@ enum class FaultKind : std::uint8_t {
 /// What goes wrong, where, and from when to when on the simulated clock.
 struct Fault {
     FaultKind kind = FaultKind::silence;
-    double value = 0.0;                  ///< exception code, or seconds late
+    double value = 0.0;                       ///< exception code, or seconds late
     std::optional<std::size_t> channel = {};  ///< sensor faults: T1 is 0; nothing: every channel
     std::optional<std::uint8_t> unit = {};    ///< faults of the line; nothing: every unit
     double from_s = 0.0;
