@@ -101,6 +101,7 @@ class Loader {
         set(identification.tolerance_C, reader.number("tolerance_C", {0.01, 5.0}));
         set(identification.max_lag, reader.integer("max_lag", {1, 100}));
         set(identification.every_s, reader.number("every_s", {0.1, 3600.0}));
+        set(identification.sweep_always, reader.boolean("sweep_always"));
         set(identification.workers, reader.integer("workers", {1, 64}));
     }
 

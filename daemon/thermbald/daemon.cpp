@@ -18,10 +18,12 @@ namespace thermbal {
 
 void Daemon::take_scan(const Scan& scan) {
     latest_ = scan;
+    bool identifying = false;
     if (is_measuring(test_.state)) {
         store_scan(scan);
         grow_window(scan);
         if (identification_is_due(scan.scan)) {
+            identifying = true;
             test_.submitted_scan = scan.scan;
             identifier_->submit(
                 {generation_, scan.scan, test_.window, test_.declarations.declared_channels(), test_.flow});
@@ -32,7 +34,7 @@ void Daemon::take_scan(const Scan& scan) {
         }
     }
     if (server_.counters().subscribers > 0) server_.publish("scan", channels_json().value_or(nullptr));
-    if (!is_measuring(test_.state) || test_.submitted_scan != scan.scan) settle(scan.scan);
+    if (!is_measuring(test_.state) || !identifying) settle(scan.scan);
 }
 
 void Daemon::take_identification(IdentificationResult result) {
@@ -120,10 +122,12 @@ void Daemon::grow_window(const Scan& scan) {
     test_.last_scan = scan.scan;
 }
 
+/// On multiples of every_s of the test's time, as replay does it, so that both see the same windows; while the
+/// identifier is busy, the first scan after it.
 bool Daemon::identification_is_due(std::int64_t scan) const {
-    const double every = options_.config.identification.every_s / options_.config.test.period_s;
-    return static_cast<double>(scan - test_.submitted_scan) >= std::max(1.0, every) - 1e-9 &&
-           !identifier_->busy();
+    const double scans_between = options_.config.identification.every_s / options_.config.test.period_s;
+    const auto turn = [&](std::int64_t at) { return std::floor(static_cast<double>(at) / scans_between + 1e-9); };
+    return turn(scan) > turn(test_.submitted_scan) && !identifier_->busy();
 }
 
 void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::int64_t window_end_scan) {

@@ -8,6 +8,7 @@ FlowOptions flow_options(const Config& config) {
     options.ambient = ambient ? config.channels[*ambient].name : "";
     options.tolerance_C = config.identification.tolerance_C;
     options.sweep.last_lag = static_cast<std::size_t>(config.identification.max_lag);
+    options.sweep_when = config.identification.sweep_always ? SweepWhen::always : SweepWhen::needed;
     return options;
 }
 

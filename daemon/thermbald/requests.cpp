@@ -63,6 +63,11 @@ double rate_C_per_h(const std::vector<double>& values_C, double period_s, std::s
     return determinant > 0 ? (n * stv - st * sv) / determinant : no_value;
 }
 
+/// Not a number stays not a number: an unknown equilibrium time is not "now".
+double time_left_min(double equilibrium_time_min, double now_min) {
+    return std::isfinite(equilibrium_time_min) ? std::max(0.0, equilibrium_time_min - now_min) : no_value;
+}
+
 double first_good(const std::vector<double>& values) {
     const auto found = std::ranges::find_if(values, [](double value) { return std::isfinite(value); });
     return found == values.end() ? no_value : *found;
@@ -175,7 +180,7 @@ Result<json> Daemon::channels_json() const {
             entry["steady_state_low_C"] = number_or_null(verdict->steady_state_low_C);
             entry["steady_state_high_C"] = number_or_null(verdict->steady_state_high_C);
             entry["equilibrium_time_min"] = number_or_null(verdict->equilibrium_time_min);
-            entry["time_left_min"] = number_or_null(std::max(0.0, verdict->equilibrium_time_min - time_min));
+            entry["time_left_min"] = number_or_null(time_left_min(verdict->equilibrium_time_min, time_min));
             entry["reason"] = verdict->reason;
         }
         list.push_back(std::move(entry));

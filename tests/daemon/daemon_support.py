@@ -40,7 +40,7 @@ def configuration(folder, line, *, units=((1, 16),), profile="generic-16x-int16"
     tables = [("[test]", {"start": "auto", **(test or {})}),
               ("[store]", {"path": f"{folder}/test.db"}),
               ("[service]", {"socket": f"{folder}/daemon.sock"}),
-              ("[identification]", identification or {}),
+              ("[identification]", {"sweep_always": False, **(identification or {})}),
               ("[stop]", stop or {}),
               ("[[line]]", {"name": "module", **line})]
     channel = 0

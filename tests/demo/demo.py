@@ -49,6 +49,9 @@ socket = "{folder}/thermbald.sock"
 [log]
 level = "warning"
 
+[identification]
+sweep_always = false      # faster than time: the sweep over n only where nothing else speaks against a declaration
+
 [stop]                    # clearing coil 0 stops the simulated spindle
 action = "write_coil"
 line = "module"

@@ -65,6 +65,7 @@ struct IdentificationConfig {
     double tolerance_C = 0.2;
     int max_lag = 35;
     double every_s = 120.0;
+    bool sweep_always = true;  ///< false: sweep over n only where nothing else speaks against a declaration
     int workers = 2;
 };
 
