@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <set>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -117,9 +118,14 @@ int run_identify(const OfflineOptions& options) {
     if (!input) return refused(input.error());
     if (options.until_min) input->window = window_until(input->window, *options.until_min * 60.0);
     if (!options.modes_only) input->flow.sweep_when = SweepWhen::always;
+    std::set<std::string>
+        unwanted;  // the others are estimated, the shared time constants need them, but not swept
+    for (const Column& column : input->window.channels) {
+        if (!is_wanted(options, column.name)) unwanted.insert(column.name);
+    }
     LiveFlow flow(input->flow);
     const auto verdict =
-        flow.identify(input->window, {}, parallel_on_threads(options.threads, false), not_cancelled);
+        flow.identify(input->window, unwanted, parallel_on_threads(options.threads, false), not_cancelled);
     if (!verdict) return refused(verdict.error());
     if (options.json) {
         fmt::print("{}\n", json{{"window_end_min", verdict->window_end_min},
