@@ -109,9 +109,10 @@ std::string explain_config(const Config& config) {
     text += fmt::format("\n[service]\nsocket = {}\noperators_group = {}\n", quoted(config.service.socket),
                         quoted(config.service.operators_group));
     text += fmt::format("\n[log]\nlevel = {}\n", quoted(config.log.level));
-    text += fmt::format("\n[identification]\ntolerance_C = {}\nmax_lag = {}\nevery_s = {}\nsweep_always = {}\nworkers = {}\n",
-                        identification.tolerance_C, identification.max_lag, identification.every_s,
-                        identification.sweep_always, identification.workers);
+    text += fmt::format(
+        "\n[identification]\ntolerance_C = {}\nmax_lag = {}\nevery_s = {}\nsweep_always = {}\nworkers = {}\n",
+        identification.tolerance_C, identification.max_lag, identification.every_s,
+        identification.sweep_always, identification.workers);
     text += explain_stop(config);
     for (const LineConfig& line : config.lines) text += explain_line(line);
     for (const UnitConfig& unit : config.units) text += explain_unit(config, unit);

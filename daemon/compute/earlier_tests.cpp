@@ -4,8 +4,8 @@
 
 namespace thermbal {
 
-Result<MachinePrior> prior_of_machine(const Reader& database, std::string_view machine, const SpectrumOptions& spectrum,
-                                      std::size_t most_tests) {
+Result<MachinePrior> prior_of_machine(const Reader& database, std::string_view machine,
+                                      const SpectrumOptions& spectrum, std::size_t most_tests) {
     const auto records = database.archive(machine);
     if (!records) return std::unexpected(records.error());
     std::vector<ArchivedSpectrum> tests;

@@ -5,8 +5,9 @@ namespace thermbal {
 nlohmann::json spectrum_to_json(const ArchivedSpectrum& spectrum) {
     nlohmann::json responses = nlohmann::json::array();
     for (const ArchivedSpectrum::Response& response : spectrum.responses) {
-        responses.push_back(
-            {{"channel", response.channel}, {"rise_C", response.rise_C}, {"amplitude_C", response.amplitude_C}});
+        responses.push_back({{"channel", response.channel},
+                             {"rise_C", response.rise_C},
+                             {"amplitude_C", response.amplitude_C}});
     }
     return {{"time_constant_min", spectrum.time_constant_min},
             {"mode_density", spectrum.mode_density},

@@ -122,11 +122,13 @@ void Daemon::grow_window(const Scan& scan) {
     test_.last_scan = scan.scan;
 }
 
-/// On multiples of every_s of the test's time, as replay does it, so that both see the same windows; while the
-/// identifier is busy, the first scan after it.
+/// On multiples of every_s of the test's time, as replay does it, so that both see the same windows; while
+/// the identifier is busy, the first scan after it.
 bool Daemon::identification_is_due(std::int64_t scan) const {
     const double scans_between = options_.config.identification.every_s / options_.config.test.period_s;
-    const auto turn = [&](std::int64_t at) { return std::floor(static_cast<double>(at) / scans_between + 1e-9); };
+    const auto turn = [&](std::int64_t at) {
+        return std::floor(static_cast<double>(at) / scans_between + 1e-9);
+    };
     return turn(scan) > turn(test_.submitted_scan) && !identifier_->busy();
 }
 

@@ -62,7 +62,7 @@ class Daemon {
         StopDecision decision;
         std::int64_t last_scan = -1;
         std::optional<std::int64_t> identified_scan;  ///< newest window that was identified
-        std::int64_t submitted_scan = 0;             ///< newest window given to the identifier
+        std::int64_t submitted_scan = 0;              ///< newest window given to the identifier
         double identification_s = 0.0;
         std::string end_reason;
         int stop_attempts = 0;

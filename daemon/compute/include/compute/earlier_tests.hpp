@@ -19,7 +19,7 @@ struct MachinePrior {
 
 /// The newest tests of `machine` in the database's archive (of every machine with an empty name), at most
 /// `most_tests`. Errors: as Reader; stop when an entry cannot be read.
-Result<MachinePrior> prior_of_machine(const Reader& database, std::string_view machine, const SpectrumOptions& spectrum,
-                                      std::size_t most_tests = 10);
+Result<MachinePrior> prior_of_machine(const Reader& database, std::string_view machine,
+                                      const SpectrumOptions& spectrum, std::size_t most_tests = 10);
 
 }  // namespace thermbal
