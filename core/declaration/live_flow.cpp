@@ -22,6 +22,7 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
     const TestWindow& since = regime.window;
     WindowVerdict verdict{window.end_s() / 60.0, regime.since_s / 60.0, {}, {}, {}};
 
+    forget_before(since.end_s() - 2.0 * options_.guards.look_back_min * 60.0, window.period_s);
     const auto& now = estimate(since, regime.start_level_C);
     std::vector<const SpectrumEstimate*> shorter;  // the same regime seen from a little earlier
     for (const double back : {1.0, 2.0}) {
@@ -58,6 +59,14 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
     return verdict;
 }
 
+/// Only windows up to two look-backs old are asked for again; a test of days must not remember them all.
+void LiveFlow::forget_before(double window_end_s, double period_s) {
+    std::erase_if(estimates_, [&](const auto& entry) {
+        const auto& [start_ms, scans] = entry.first;
+        return static_cast<double>(start_ms) * 1e-3 + static_cast<double>(scans) * period_s < window_end_s;
+    });
+}
+
 bool LiveFlow::sweep_is_wanted(const ChannelVerdict& channel) const {
     switch (options_.sweep_when) {
         case SweepWhen::always:
@@ -85,9 +94,6 @@ const Result<ArchivedEstimate>& LiveFlow::estimate(const TestWindow& regime,
     const std::pair key{std::llround(regime.start_s * 1e3), regime.scans};
     const auto known = estimates_.find(key);
     if (known != estimates_.end()) return known->second;
-    // Only windows up to two look-backs old are asked for again.
-    constexpr std::size_t remembered = 64;
-    while (estimates_.size() >= remembered) estimates_.erase(estimates_.begin());
     return estimates_.emplace(key, compute()).first->second;
 }
 

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <malloc.h>
 #include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -68,6 +69,14 @@ void leave_signals_to_the_loop() {
     std::signal(SIGPIPE, SIG_IGN);
 }
 
+/// An identification takes some megabytes for a second; without this, every thread keeps its own share of
+/// them for good, and a daemon that runs for weeks looks as if it leaked (measured over 21 h: 20 to 42 MiB
+/// against 14 to 17).
+void give_memory_back() {
+    mallopt(M_ARENA_MAX, 2);
+    mallopt(M_TRIM_THRESHOLD, 64 * 1024);
+}
+
 int refused(const Error& error) {
     fmt::print(stderr, "{}\n", error.message);
     return error.next == NextStep::refuse_input ? 2 : 1;
@@ -119,6 +128,7 @@ int main(int argc, char** argv) {
     spdlog::set_pattern(std::getenv("JOURNAL_STREAM") != nullptr ? "%l: %v" : "%Y-%m-%dT%H:%M:%S.%e %l: %v");
 
     leave_signals_to_the_loop();
+    give_memory_back();
     auto [clock, clock_name] = make_clock(flags);
     auto daemon = Daemon::create({std::move(*config), version, clock_name, flags.exit_when_ended}, *clock);
     if (!daemon) return refused(daemon.error());

@@ -205,10 +205,10 @@ TEST_P(LinkTest, DuplicatedReplyIsNotTheNextReading) {
     });
     int good = 0;
     for (int i = 0; i < 6; ++i) good += read(8 * i) ? 1 : 0;
-    // read() has compared every accepted word. Over TCP the transaction id tells which is which: a duplicate that is
-    // there before the next request is read away, one that comes during it costs that exchange (the connection is
-    // made again), so how many of the six are good depends on the timing, and that some are does not. RTU cannot know
-    // and says so.
+    // read() has compared every accepted word. Over TCP the transaction id tells which is which: a duplicate
+    // that is there before the next request is read away, one that comes during it costs that exchange (the
+    // connection is made again), so how many of the six are good depends on the timing, and that some are
+    // does not. RTU cannot know and says so.
     if (GetParam() == Transport::tcp) {
         EXPECT_GE(good, 3) << message_;
     } else {

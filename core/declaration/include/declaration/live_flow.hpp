@@ -93,6 +93,7 @@ class LiveFlow {
     const FlowOptions& options() const { return options_; }
 
   private:
+    void forget_before(double window_end_s, double period_s);
     bool sweep_is_wanted(const ChannelVerdict& channel) const;
     const Result<ArchivedEstimate>& estimate(const TestWindow& regime,
                                              const std::vector<double>& start_level_C);
