@@ -17,8 +17,30 @@ std::int64_t read_ns(clockid_t id) {
     return now.tv_sec * ns_per_s + now.tv_nsec;
 }
 
+/// What every clock here shares: a sleep that wake() ends.
+class WakeableClock : public Clock {
+  public:
+    void wake() override {
+        {
+            const std::lock_guard lock(mutex_);
+            ++wakes_;
+        }
+        changed_.notify_all();
+    }
+
+    std::uint64_t wakes() const override {
+        const std::lock_guard lock(mutex_);
+        return wakes_;
+    }
+
+  protected:
+    mutable std::mutex mutex_;
+    std::condition_variable_any changed_;
+    std::uint64_t wakes_ = 0;  // guarded by mutex_
+};
+
 /// Sleeping that wake() and a stop request can end. Subclasses say how much real time is left.
-class SleepingClock : public Clock {
+class SleepingClock : public WakeableClock {
   public:
     bool sleep_until(std::int64_t deadline_ns, std::uint64_t seen_wakes,
                      const std::stop_token& stop) override {
@@ -34,25 +56,7 @@ class SleepingClock : public Clock {
         return true;
     }
 
-    void wake() override {
-        {
-            const std::lock_guard lock(mutex_);
-            ++wakes_;
-        }
-        changed_.notify_all();
-    }
-
-    std::uint64_t wakes() const override {
-        const std::lock_guard lock(mutex_);
-        return wakes_;
-    }
-
     void settled(std::int64_t /*deadline_ns*/) override {}
-
-  private:
-    mutable std::mutex mutex_;
-    std::condition_variable_any changed_;
-    std::uint64_t wakes_ = 0;  // guarded by mutex_
 };
 
 class SystemClock final : public SleepingClock {
@@ -87,7 +91,7 @@ class ScaledClock final : public SleepingClock {
     const std::int64_t wall_at_epoch_ns_;
 };
 
-class LockstepClock final : public Clock {
+class LockstepClock final : public WakeableClock {
   public:
     LockstepClock(std::int64_t start_ns, std::int64_t start_wall_ns)
         : wall_offset_ns_(start_wall_ns - start_ns), now_ns_(start_ns), settled_ns_(start_ns) {}
@@ -109,19 +113,6 @@ class LockstepClock final : public Clock {
         return true;
     }
 
-    void wake() override {
-        {
-            const std::lock_guard lock(mutex_);
-            ++wakes_;
-        }
-        changed_.notify_all();
-    }
-
-    std::uint64_t wakes() const override {
-        const std::lock_guard lock(mutex_);
-        return wakes_;
-    }
-
     void settled(std::int64_t deadline_ns) override {
         {
             const std::lock_guard lock(mutex_);
@@ -136,11 +127,8 @@ class LockstepClock final : public Clock {
 
   private:
     const std::int64_t wall_offset_ns_;
-    mutable std::mutex mutex_;
-    std::condition_variable_any changed_;
     std::int64_t now_ns_;  // guarded by mutex_, as the rest
     std::int64_t settled_ns_;
-    std::uint64_t wakes_ = 0;
 };
 
 }  // namespace
