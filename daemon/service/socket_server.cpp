@@ -103,9 +103,10 @@ struct SocketServer::Parts {
     std::map<int, Client> clients;
     Counters counters;
     bool dispatching = false;
+    bool connections_wait = false;  ///< no descriptor left, not even to refuse: tried again at each dispatch
 
     void accept_clients();
-    void accept_without_descriptor();
+    bool refuse_without_descriptor();
     bool has_room_for(const Peer& peer) const;
     void refuse_client(const Descriptor& socket);
     void serve(Client& client, std::uint32_t events);
@@ -128,7 +129,10 @@ void SocketServer::Parts::accept_clients() {
     for (;;) {
         Descriptor socket(accept4(listener.fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
         if (!socket.valid()) {
-            if (errno == EMFILE || errno == ENFILE) accept_without_descriptor();
+            const int error = errno;
+            if (error == EINTR || error == ECONNABORTED) continue;
+            if ((error == EMFILE || error == ENFILE) && refuse_without_descriptor()) continue;
+            connections_wait = error != EAGAIN;
             return;
         }
         const Peer peer = peer_of(socket.get());
@@ -149,12 +153,17 @@ void SocketServer::Parts::accept_clients() {
     }
 }
 
-void SocketServer::Parts::accept_without_descriptor() {
-    // Left in the queue, the connection would keep the loop spinning.
+bool SocketServer::Parts::refuse_without_descriptor() {
     spare.reset();
-    const Descriptor socket(accept4(listener.fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
-    if (socket.valid()) refuse_client(socket);
+    bool refused = false;
+    {
+        const Descriptor socket(accept4(listener.fd(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+        refused = socket.valid();
+        if (refused) refuse_client(socket);
+    }
+    // Another thread may have taken the place that was given up.
     spare = Descriptor(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+    return refused && spare.valid();
 }
 
 bool SocketServer::Parts::has_room_for(const Peer& peer) const {
@@ -355,14 +364,15 @@ Result<SocketServer> SocketServer::open(const SocketServerOptions& options) {
     if (!listener) return std::unexpected(listener.error());
     Descriptor epoll(epoll_create1(EPOLL_CLOEXEC));
     epoll_event event{};
-    event.events = EPOLLIN;
+    // Edge-triggered: a connection that no descriptor is left for must not keep the loop spinning.
+    event.events = EPOLLIN | EPOLLET;
     event.data.fd = listener->fd();
     if (!epoll.valid() || epoll_ctl(epoll.get(), EPOLL_CTL_ADD, listener->fd(), &event) != 0)
         return fail(NextStep::stop, fmt::format("socket {}: {}", options.path.string(),
                                                 std::generic_category().message(errno)));
     Descriptor spare(::open("/dev/null", O_RDONLY | O_CLOEXEC));
-    SocketServer server(std::unique_ptr<Parts>(
-        new Parts{options, std::move(*listener), std::move(epoll), std::move(spare), {}, {}, {}, false}));
+    SocketServer server(std::unique_ptr<Parts>(new Parts{
+        options, std::move(*listener), std::move(epoll), std::move(spare), {}, {}, {}, false, false}));
     // Named here so that they are known methods; they act on the client itself, in result_of.
     server.add_method("subscribe", Access::reads, {});
     server.add_method("unsubscribe", Access::reads, {});
@@ -393,6 +403,7 @@ void SocketServer::dispatch() {
     }
     parts.dispatching = false;
     parts.bury();
+    if (parts.connections_wait) parts.accept_clients();
 }
 
 void SocketServer::publish(std::string_view topic, const json& params) {
