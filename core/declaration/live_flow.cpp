@@ -8,6 +8,7 @@
 
 #include "channel_sweep.hpp"
 #include "guards.hpp"
+#include "kalman_prediction.hpp"
 
 namespace thermbal {
 
@@ -40,6 +41,7 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
         if (column.name == options_.ambient) continue;
         ChannelVerdict channel = begin_verdict(column, verdict.window_end_min);
         const Column& samples = *since.channel(column.name);
+        channel.kalman = kalman_prediction(samples.values, since);
         const Evidence evidence{since, samples, regime, now ? &now->estimate : nullptr, shorter};
         ask_samples(channel, evidence, options_);
         if (channel.state == ChannelState::measuring) {

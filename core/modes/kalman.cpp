@@ -47,13 +47,23 @@ Result<void> KalmanOptions::check() const {
 }
 
 void AdaptiveUnscentedKalman::add(double temperature_C) {
-    if (!started_) {
-        if (!std::isnan(temperature_C)) start(temperature_C);
-        return;
+    if (started_) {
+        ++scans_;
+        predict();
+        if (!std::isnan(temperature_C) && !is_spike(temperature_C)) update(temperature_C);
+    } else if (std::isnan(temperature_C)) {
+        ++scans_;
+    } else {
+        start(temperature_C);
     }
-    ++scans_;
-    predict();
-    if (!std::isnan(temperature_C)) update(temperature_C);
+}
+
+bool AdaptiveUnscentedKalman::is_spike(double temperature_C) {
+    const double innovation = temperature_C - state_[0];
+    const double expected = covariance_[0][0] + noise_variance_;
+    const bool far = innovation * innovation > options_.spike_sds * options_.spike_sds * expected;
+    spikes_ = far ? spikes_ + 1 : 0;
+    return far && spikes_ < options_.spikes_in_a_row;
 }
 
 void AdaptiveUnscentedKalman::start(double temperature_C) {
@@ -169,6 +179,12 @@ double AdaptiveUnscentedKalman::equilibrium_time_min() const {
     const double left = steady_state - state_[0];
     if (rise == 0.0 || left / rise <= 0.05) return now_min;
     return now_min + time_constant_min() * std::log(left / (0.05 * rise));
+}
+
+AdaptiveUnscentedKalman kalman_after(std::span<const double> samples_C, const KalmanOptions& options) {
+    AdaptiveUnscentedKalman filter(options);
+    for (const double sample_C : samples_C) filter.add(sample_C);
+    return filter;
 }
 
 }  // namespace thermbal

@@ -8,11 +8,11 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "compute/earlier_tests.hpp"
 #include "compute/threads.hpp"
 #include "declaration/declarations.hpp"
 #include "declaration/stop_rule.hpp"
-#include "files.hpp"
+#include "offline_input.hpp"
+#include "output.hpp"
 #include "report/spectrum_json.hpp"
 #include "report/verdict_json.hpp"
 #include "series/sample.hpp"
@@ -23,65 +23,8 @@ namespace {
 
 using nlohmann::json;
 
-int refused(const Error& error) {
-    fmt::print(stderr, "thermbalctl: {}\n", error.message);
-    return error.next == NextStep::refuse_input ? 2 : 1;
-}
-
 bool not_cancelled() {
     return false;
-}
-
-struct Input {
-    TestWindow window;
-    FlowOptions flow;
-};
-
-/// The recording on its own grid, and the live flow's options; everything that a person can have got wrong is
-/// said.
-Result<Input> read_input(const OfflineOptions& options) {
-    const auto text = read_file(options.file);
-    if (!text) return std::unexpected(text.error());
-    const auto test = parse_recorded_test(*text, options.file);
-    if (!test) return std::unexpected(test.error());
-    const double period_s = median_step_s(*test);
-    if (period_s <= 0.0) {
-        return fail(NextStep::refuse_input,
-                    fmt::format("{}: one row only; expected a recorded test", options.file));
-    }
-    Input input{to_window(*test, period_s), {}};
-    input.flow.ambient = options.ambient == "none" ? "" : options.ambient;
-    input.flow.tolerance_C = options.tolerance_C;
-    if (!options.archive.empty()) {
-        const auto database = Reader::open(options.archive);
-        if (!database) return std::unexpected(database.error());
-        auto earlier = prior_of_machine(*database, options.machine, input.flow.spectrum);
-        if (!earlier) return std::unexpected(earlier.error());
-        if (!earlier->prior) {
-            fmt::print(
-                stderr,
-                "thermbalctl: {}: no earlier test{} in it, going on without; a test that ends leaves one, "
-                "`thermbalctl learn` adds recordings\n",
-                options.archive, options.machine.empty() ? "" : " of " + options.machine);
-        }
-        input.flow.prior = std::move(earlier->prior);
-    }
-    if (options.modes_only) input.flow.sweep_when = SweepWhen::never;
-    if (!input.flow.ambient.empty() && input.window.channel(input.flow.ambient) == nullptr) {
-        return fail(NextStep::refuse_input,
-                    fmt::format("{}: no column {}; name the ambient with --ambient, or --ambient none",
-                                options.file, input.flow.ambient));
-    }
-    for (const std::string& channel : options.channels) {
-        if (input.window.channel(channel) == nullptr) {
-            return fail(NextStep::refuse_input, fmt::format("{}: no column {}", options.file, channel));
-        }
-    }
-    return input;
-}
-
-bool is_wanted(const OfflineOptions& options, const std::string& channel) {
-    return options.channels.empty() || std::ranges::find(options.channels, channel) != options.channels.end();
 }
 
 json channels_json(const OfflineOptions& options, const std::vector<ChannelVerdict>& verdicts) {
@@ -115,7 +58,7 @@ void print_table(const OfflineOptions& options, const std::vector<ChannelVerdict
 
 int run_identify(const OfflineOptions& options) {
     auto input = read_input(options);
-    if (!input) return refused(input.error());
+    if (!input) return report_error(input.error());
     if (options.until_min) input->window = window_until(input->window, *options.until_min * 60.0);
     if (!options.modes_only) input->flow.sweep_when = SweepWhen::always;
     std::set<std::string>
@@ -126,7 +69,7 @@ int run_identify(const OfflineOptions& options) {
     LiveFlow flow(input->flow);
     const auto verdict =
         flow.identify(input->window, unwanted, parallel_on_threads(options.threads, false), not_cancelled);
-    if (!verdict) return refused(verdict.error());
+    if (!verdict) return report_error(verdict.error());
     if (options.json) {
         fmt::print("{}\n", json{{"window_end_min", verdict->window_end_min},
                                 {"regime_since_min", verdict->regime_since_min},
@@ -143,18 +86,18 @@ int run_learn(const LearnOptions& options) {
     OfflineOptions one;
     one.ambient = options.ambient;
     auto store = Store::open(options.archive, {options.now_wall_ns, 0});
-    if (!store) return refused(store.error());
+    if (!store) return report_error(store.error());
     for (const std::string& file : options.files) {
         one.file = file;
         const auto input = read_input(one);
-        if (!input) return refused(input.error());
+        if (!input) return report_error(input.error());
         FlowOptions flow = input->flow;
         flow.sweep_when = SweepWhen::never;
         const auto verdict =
             LiveFlow(flow).identify(input->window, {}, parallel_on_threads(1, false), not_cancelled);
-        if (!verdict) return refused(verdict.error());
+        if (!verdict) return report_error(verdict.error());
         if (!verdict->spectrum) {
-            return refused(
+            return report_error(
                 {NextStep::refuse_input,
                  fmt::format("{}: the machine's inputs change during the test; expected one regime", file)});
         }
@@ -163,7 +106,7 @@ int run_learn(const LearnOptions& options) {
                                                .test_id = {},
                                                .created_wall_ns = options.now_wall_ns,
                                                .spectrum_json = spectrum_to_json(*verdict->spectrum).dump()});
-        if (!id) return refused(id.error());
+        if (!id) return report_error(id.error());
         fmt::print("{}: {:.0f} min of {} are in {}\n", file, verdict->window_end_min,
                    options.machine.empty() ? "a machine without name" : options.machine, options.archive);
     }
@@ -172,7 +115,7 @@ int run_learn(const LearnOptions& options) {
 
 int run_replay(const OfflineOptions& options) {
     const auto input = read_input(options);
-    if (!input) return refused(input.error());
+    if (!input) return report_error(input.error());
     const ParallelFor parallel_for = parallel_on_threads(options.threads, false);
     LiveFlow flow(input->flow);
     Declarations declarations;
@@ -187,7 +130,7 @@ int run_replay(const OfflineOptions& options) {
         const TestWindow window = window_until(input->window, until_min * 60.0);
         const auto verdict =
             flow.identify(window, declarations.declared_channels(), parallel_for, not_cancelled);
-        if (!verdict && verdict.error().next == NextStep::refuse_input) return refused(verdict.error());
+        if (!verdict && verdict.error().next == NextStep::refuse_input) return report_error(verdict.error());
         if (!verdict) continue;
         if (archive_dropped.empty() && !verdict->archive_dropped.empty()) {
             archive_dropped = verdict->archive_dropped;

@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "commands.hpp"
+#include "compare.hpp"
 #include "offline.hpp"
 
 namespace thermbal {
@@ -24,9 +25,12 @@ void add_recording_flags(CLI::App& command, OfflineOptions& options) {
     command.add_option("--threads", options.threads, "compute threads")
         ->capture_default_str()
         ->check(CLI::Range(1, 256));
+    command.add_flag("--json", options.json, "one JSON document on standard output");
+}
+
+void add_modes_only_flag(CLI::App& command, OfflineOptions& options) {
     command.add_flag("--modes-only", options.modes_only,
                      "a study: the shared modes alone, without the SVR criterion");
-    command.add_flag("--json", options.json, "one JSON document on standard output");
 }
 
 }  // namespace
@@ -36,6 +40,7 @@ void add_offline_commands(CLI::App& app, int& status) {
     CLI::App& identify_command = *app.add_subcommand("identify", "identify a recorded test once");
     identify_command.group(group);
     add_recording_flags(identify_command, *identify);
+    add_modes_only_flag(identify_command, *identify);
     identify_command.add_option("--until-min", identify->until_min, "use only the samples up to this time");
     identify_command.callback([&status, identify] { status = run_identify(*identify); });
 
@@ -44,11 +49,28 @@ void add_offline_commands(CLI::App& app, int& status) {
         *app.add_subcommand("replay", "run the growing window as the daemon would have");
     replay_command.group(group);
     add_recording_flags(replay_command, *replay);
+    add_modes_only_flag(replay_command, *replay);
     replay_command
         .add_option("--every-min", replay->every_min, "minutes of samples between two identifications")
         ->capture_default_str()
         ->check(CLI::Range(0.01, 1e6));
     replay_command.callback([&status, replay] { status = run_replay(*replay); });
+
+    const auto compare = std::make_shared<CompareOptions>();
+    compare->recording.every_min = 10.0;
+    CLI::App& compare_command = *app.add_subcommand(
+        "compare", "every estimator at every window of a complete recording, against its end");
+    compare_command.group(group);
+    add_recording_flags(compare_command, compare->recording);
+    compare_command
+        .add_option("--every-min", compare->recording.every_min, "minutes of samples between two windows")
+        ->capture_default_str()
+        ->check(CLI::Range(0.01, 1e6));
+    compare_command.add_option("--estimator", compare->estimators,
+                               "only this one, several times for several: svr (slow), one_exponential, "
+                               "two_exponentials, kalman, modes, modes_with_archive");
+    compare_command.add_option("--plot", compare->plot, "draw the errors into this .html or .svg");
+    compare_command.callback([&status, compare] { status = run_compare(*compare); });
 
     const auto learn = std::make_shared<LearnOptions>();
     CLI::App& learn_command = *app.add_subcommand(

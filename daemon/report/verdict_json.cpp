@@ -26,13 +26,15 @@ nlohmann::json number_or_null(double value) {
     return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
 }
 
+nlohmann::json guard_to_json(const Guard& guard) {
+    return {{"name", guard.name}, {"passed", guard.passed}, {"figures", guard.figures}};
+}
+
 nlohmann::json verdict_to_json(const ChannelVerdict& verdict) {
     nlohmann::json curve = nlohmann::json::array();
     for (const double rmse_C : verdict.rmse_by_n_C) curve.push_back(number_or_null(rmse_C));
     nlohmann::json guards = nlohmann::json::array();
-    for (const Guard& guard : verdict.guards) {
-        guards.push_back({{"name", guard.name}, {"passed", guard.passed}, {"figures", guard.figures}});
-    }
+    for (const Guard& guard : verdict.guards) guards.push_back(guard_to_json(guard));
     return {{"channel", verdict.channel},
             {"state", to_string(verdict.state)},
             {"declared", verdict.declared()},
@@ -54,6 +56,11 @@ nlohmann::json verdict_to_json(const ChannelVerdict& verdict) {
               {"equilibrium_time_min", number_or_null(verdict.svr.equilibrium_time_min)},
               {"C", number_or_null(verdict.svr.C)},
               {"sigma", number_or_null(verdict.svr.sigma)}}},
+            {"kalman",
+             {{"steady_state_C", number_or_null(verdict.kalman.steady_state_C)},
+              {"steady_state_low_C", number_or_null(verdict.kalman.steady_state_low_C)},
+              {"steady_state_high_C", number_or_null(verdict.kalman.steady_state_high_C)},
+              {"equilibrium_time_min", number_or_null(verdict.kalman.equilibrium_time_min)}}},
             {"guards", std::move(guards)},
             {"reason", verdict.reason}};
 }
@@ -81,6 +88,12 @@ Result<ChannelVerdict> verdict_from_json(const nlohmann::json& json) {
         verdict.svr = {svr.at("n").get<int>(), number_from(svr, "steady_state_C"),
                        number_from(svr, "equilibrium_time_min"), number_from(svr, "C"),
                        number_from(svr, "sigma")};
+        if (const auto kalman = json.find("kalman");
+            kalman != json.end()) {  // stored by an older version: none
+            verdict.kalman = {
+                number_from(*kalman, "steady_state_C"), number_from(*kalman, "steady_state_low_C"),
+                number_from(*kalman, "steady_state_high_C"), number_from(*kalman, "equilibrium_time_min")};
+        }
         for (const nlohmann::json& guard : json.at("guards")) {
             verdict.guards.push_back({guard.at("name").get<std::string>(), guard.at("passed").get<bool>(),
                                       guard.at("figures").get<std::string>()});

@@ -28,6 +28,15 @@ struct SvrPrediction {
     double sigma = std::numeric_limits<double>::quiet_NaN();
 };
 
+/// What the adaptive unscented Kalman filter says by itself: one exponential, one channel, with a 90 %
+/// interval.
+struct KalmanPrediction {
+    double steady_state_C = std::numeric_limits<double>::quiet_NaN();
+    double steady_state_low_C = std::numeric_limits<double>::quiet_NaN();
+    double steady_state_high_C = std::numeric_limits<double>::quiet_NaN();
+    double equilibrium_time_min = std::numeric_limits<double>::quiet_NaN();
+};
+
 /// One channel at the end of one window. NaN where a figure is not known.
 struct ChannelVerdict {
     std::string channel;
@@ -47,6 +56,7 @@ struct ChannelVerdict {
     double equilibrium_time_low_min = std::numeric_limits<double>::quiet_NaN();
     double equilibrium_time_high_min = std::numeric_limits<double>::quiet_NaN();
     SvrPrediction svr;
+    KalmanPrediction kalman;  ///< reported beside the SVR, no guard asks it
     std::vector<Guard>
         guards;  ///< in the order in which they were asked; the first that failed is the reason
     std::string reason;

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 
 #include "base/error.hpp"
 
@@ -18,6 +19,8 @@ struct KalmanOptions {
     double slope_walk_share = 0.002;        ///< process noise a step, of the slope: lets other modes in
     double log_time_constant_walk = 0.002;  ///< the rate slows as fast modes die away
     double forgetting = 0.99;  ///< of the adaptive noise estimate (Sage and Husa 1969), per sample
+    double spike_sds = 8.0;    ///< an innovation beyond this many of its own deviations is a spike ...
+    int spikes_in_a_row = 4;   ///< ... unless this many follow each other: then the channel has moved
 
     Result<void> check() const;
 };
@@ -41,8 +44,8 @@ class AdaptiveUnscentedKalman {
     double steady_state_sd_C() const { return settled().sd_C; }
     double time_constant_min() const;
     double measurement_sd_C() const;
-    /// Since the first sample: when 95 % of the way from it to the steady state is done; the past if it is
-    /// over.
+    /// Since the first scan that was added: when 95 % of the way from it to the steady state is done; the
+    /// past if it is over.
     double equilibrium_time_min() const;
     std::size_t samples() const { return samples_; }
 
@@ -59,16 +62,21 @@ class AdaptiveUnscentedKalman {
     std::array<State, 2 * size> sigma_points() const;
     void start(double temperature_C);
     void predict();
+    bool is_spike(double temperature_C);
     void update(double temperature_C);
 
     KalmanOptions options_;
     bool started_ = false;
     std::size_t scans_ = 0;
     std::size_t samples_ = 0;
+    int spikes_ = 0;  ///< in a row
     double first_C_ = 0.0;
     double noise_variance_ = 0.0;
     State state_{};
     Covariance covariance_{};
 };
+
+/// The filter after the scans of a window, oldest first.
+AdaptiveUnscentedKalman kalman_after(std::span<const double> samples_C, const KalmanOptions& options);
 
 }  // namespace thermbal

@@ -1,0 +1,198 @@
+#include "declaration/compare.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+
+#include "channel_sweep.hpp"
+#include "guards.hpp"
+#include "kalman_prediction.hpp"
+#include "modes/exponentials.hpp"
+#include "regression/sweep.hpp"
+#include "series/sample.hpp"
+
+namespace thermbal {
+namespace {
+
+using Answers = std::vector<EstimatorAnswer>;
+
+EstimatorAnswer no_answer(const Error& error) {
+    EstimatorAnswer answer;
+    answer.note = error.message;
+    return answer;
+}
+
+/// An estimate and its standard deviation as a central 90 % interval.
+EstimatorAnswer normal_answer(double steady_state_C, double sd_C, double equilibrium_time_min) {
+    constexpr double sds_of_90_percent = 1.645;
+    return {steady_state_C,
+            steady_state_C - sds_of_90_percent * sd_C,
+            steady_state_C + sds_of_90_percent * sd_C,
+            equilibrium_time_min,
+            {},
+            {}};
+}
+
+Answers for_each_channel(const EstimatorInput& input,
+                         const std::function<EstimatorAnswer(const Column&)>& answer) {
+    Answers answers;
+    for (const std::string& channel : input.channels)
+        answers.push_back(answer(*input.window.channel(channel)));
+    return answers;
+}
+
+Answers svr(const EstimatorInput& input) {
+    return for_each_channel(input, [&](const Column& column) {
+        const auto swept = sweep_channel(column.values, input.window.start_s, input.window.period_s,
+                                         input.options, input.parallel_for, never_cancelled);
+        if (!swept) return no_answer(swept.error());
+        EstimatorAnswer answer;
+        answer.steady_state_C = swept->svr.steady_state_C;
+        answer.equilibrium_time_min = swept->svr.equilibrium_time_min;
+        answer.guards = {swept->minimum.guard};
+        if (std::isnan(answer.steady_state_C)) answer.note = "its free run does not settle";
+        return answer;
+    });
+}
+
+Answers exponentials(const EstimatorInput& input, std::size_t count) {
+    // One Hampel filter for all that have none of their own.
+    return for_each_channel(input, [&](const Column& column) {
+        const auto marked = mark_outliers(column.values, input.options.outliers);
+        if (!marked) return no_answer(marked.error());
+        const TestWindow alone{input.window.start_s,
+                               input.window.period_s,
+                               input.window.scans,
+                               {{column.name, marked->values_C}},
+                               {}};
+        const auto fit = fit_exponentials(alone, column.name, count);
+        if (!fit) return no_answer(fit.error());
+        return normal_answer(fit->steady_state_C, fit->steady_state_sd_C,
+                             fit->equilibrium_time_min + input.window.start_s / 60.0);
+    });
+}
+
+Answers one_exponential(const EstimatorInput& input) {
+    return exponentials(input, 1);
+}
+
+Answers two_exponentials(const EstimatorInput& input) {
+    return exponentials(input, 2);
+}
+
+Answers kalman(const EstimatorInput& input) {
+    return for_each_channel(input, [&](const Column& column) {
+        const KalmanPrediction says = kalman_prediction(column.values, input.window);
+        EstimatorAnswer answer;
+        answer.steady_state_C = says.steady_state_C;
+        answer.steady_state_low_C = says.steady_state_low_C;
+        answer.steady_state_high_C = says.steady_state_high_C;
+        answer.equilibrium_time_min = says.equilibrium_time_min;
+        if (std::isnan(answer.steady_state_C)) answer.note = "no good sample";
+        return answer;
+    });
+}
+
+Answers of_spectrum(const EstimatorInput& input, const Result<ArchivedEstimate>& estimated) {
+    return for_each_channel(input, [&](const Column& column) {
+        if (!estimated) return no_answer(estimated.error());
+        const auto& channels = estimated->estimate.channels;
+        const auto found = std::ranges::find(channels, column.name, &ChannelEstimate::channel);
+        if (found == channels.end()) return no_answer({NextStep::refuse_input, "no good sample"});
+        return EstimatorAnswer{found->steady_state_C,
+                               found->steady_state_low_C,
+                               found->steady_state_high_C,
+                               found->equilibrium_time_min,
+                               {},
+                               estimated->contradiction.reason};
+    });
+}
+
+Answers modes(const EstimatorInput& input) {
+    auto estimate = estimate_spectrum(input.window, input.options.ambient, std::nullopt,
+                                      input.options.spectrum, input.options.seed, input.start_level_C);
+    if (!estimate) return of_spectrum(input, std::unexpected(estimate.error()));
+    return of_spectrum(input, ArchivedEstimate{std::move(*estimate), {}});
+}
+
+Answers modes_with_archive(const EstimatorInput& input) {
+    return of_spectrum(
+        input, estimate_with_archive(input.window, input.options.ambient, *input.options.prior,
+                                     input.options.spectrum, input.options.seed, input.start_level_C));
+}
+
+constexpr std::array estimators{
+    Estimator{"svr", "support-vector regression of the paper, literal", false, svr},
+    Estimator{"one_exponential", "least squares, one exponential a channel", false, one_exponential},
+    Estimator{"two_exponentials", "least squares, two exponentials a channel", false, two_exponentials},
+    Estimator{"kalman", "adaptive unscented Kalman filter, one exponential a channel", false, kalman},
+    Estimator{"modes", "time constants shared by all channels", false, modes},
+    Estimator{"modes_with_archive", "the same, with earlier tests of the machine", true, modes_with_archive},
+};
+
+}  // namespace
+
+std::span<const Estimator> all_estimators() {
+    return estimators;
+}
+
+ComparedWindow compare_estimators(const TestWindow& window, std::span<const Estimator> asked,
+                                  const std::vector<std::string>& channels, const FlowOptions& options,
+                                  const ParallelFor& parallel_for) {
+    const Regime regime = current_regime(window, options);
+    ComparedWindow compared{window.end_s() / 60.0, regime.since_s / 60.0, {}};
+    const EstimatorInput input{regime.window, regime.start_level_C, channels, options, parallel_for};
+    for (const Estimator& estimator : asked) compared.answers.push_back(estimator.answer(input));
+    return compared;
+}
+
+RecordingEnd end_of_recording(const TestWindow& recording, const std::vector<std::string>& channels,
+                              const FlowOptions& options, const MeasuredEndOptions& end_options) {
+    constexpr std::size_t most_modes = 4;
+    const Regime regime = current_regime(recording, options);
+    RecordingEnd end{regime.since_s / 60.0,
+                     {},
+                     fit_shared_modes_of_best_order(regime.window, options.ambient, most_modes)};
+    for (const std::string& channel : channels)
+        end.channels.push_back(measured_end(regime.window, channel, options.ambient, end_options));
+    return end;
+}
+
+namespace {
+
+/// A figure that belongs to the channels of the modes, in the order of `channels`.
+std::vector<double> in_order_of(const std::vector<std::string>& channels, const SharedModes& modes,
+                                const std::vector<double>& figures) {
+    std::vector<double> ordered;
+    for (const std::string& channel : channels) {
+        const auto found = std::ranges::find(modes.channels, channel, &SharedModes::Channel::channel);
+        ordered.push_back(found == modes.channels.end()
+                              ? no_value
+                              : figures[static_cast<std::size_t>(found - modes.channels.begin())]);
+    }
+    return ordered;
+}
+
+}  // namespace
+
+std::vector<double> least_half_width_C(const RecordingEnd& end, const std::vector<std::string>& channels,
+                                       double period_s, double window_end_min, SharedKnowledge knowledge) {
+    constexpr double sds_of_90_percent = 1.645;
+    if (!end.modes) return std::vector<double>(channels.size(), no_value);
+    auto bound_C =
+        steady_state_bound_C(*end.modes, period_s, window_end_min - end.regime_since_min, knowledge);
+    for (double& value : bound_C) value *= sds_of_90_percent;
+    return in_order_of(channels, *end.modes, bound_C);
+}
+
+std::vector<double> earliest_knowable_min(const RecordingEnd& end, const std::vector<std::string>& channels,
+                                          double period_s, double tolerance_C, double latest_min) {
+    if (!end.modes) return std::vector<double>(channels.size(), no_value);
+    auto earliest_min = earliest_possible_min(*end.modes, period_s, tolerance_C,
+                                              latest_min - end.regime_since_min, SharedKnowledge::joint);
+    for (double& value : earliest_min) value += end.regime_since_min;
+    return in_order_of(channels, *end.modes, earliest_min);
+}
+
+}  // namespace thermbal
