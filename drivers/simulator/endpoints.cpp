@@ -141,6 +141,17 @@ Result<PortLink> PortLink::create(const std::string& target, const std::string& 
     return PortLink(path);
 }
 
+Result<PtyLine> open_pty_line(const std::string& link_path) {
+    auto port = open_pty();
+    if (!port) return std::unexpected(port.error());
+    PtyLine line{.port = std::move(*port)};
+    if (link_path.empty()) return line;
+    auto link = PortLink::create(line.port.path, link_path);
+    if (!link) return std::unexpected(link.error());
+    line.link.emplace(std::move(*link));
+    return line;
+}
+
 PortLink::~PortLink() {
     if (!path_.empty()) unlink(path_.c_str());
 }

@@ -1,6 +1,6 @@
 #include "simulator/faults.hpp"
 
-#include <array>
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <utility>
@@ -10,32 +10,11 @@
 namespace thermbal {
 namespace {
 
-constexpr std::array<std::pair<FaultKind, std::string_view>, 10> names = {{
-    {FaultKind::open, "open"},
-    {FaultKind::shorted, "short"},
-    {FaultKind::silence, "silence"},
-    {FaultKind::exception, "exception"},
-    {FaultKind::late, "late"},
-    {FaultKind::hang_up, "hangup"},
-    {FaultKind::truncated, "truncated"},
-    {FaultKind::wrong_crc, "wrong-crc"},
-    {FaultKind::wrong_transaction, "wrong-tid"},
-    {FaultKind::wrong_unit, "wrong-unit"},
-}};
+constexpr std::string_view shape =
+    "KIND[=VALUE][:TARGET][@FROM_S[-TO_S]], e.g. open:T7@3600 or exception=4:2@600-900";
 
 std::unexpected<Error> refuse(std::string_view text, std::string_view what) {
-    return fail(
-        NextStep::refuse_input,
-        fmt::format("--fault '{}': {}; write KIND[=VALUE][:TARGET]@FROM_S[-TO_S], e.g. open:T7@3600 or "
-                    "exception=4:2@600-900",
-                    text, what));
-}
-
-std::optional<FaultKind> kind_from_string(std::string_view name) {
-    for (const auto& [kind, known] : names) {
-        if (name == known) return kind;
-    }
-    return std::nullopt;
+    return fail(NextStep::refuse_input, fmt::format("fault '{}': {}; write {}", text, what, shape));
 }
 
 template <typename Number>
@@ -52,6 +31,15 @@ std::optional<double> seconds(std::string_view text) {
     return value;
 }
 
+/// Decimal, or hexadecimal after 0x.
+std::optional<double> value_number(std::string_view text) {
+    if (!text.starts_with("0x")) return number<double>(text);
+    std::uint32_t bits = 0;
+    const auto [end, error] = std::from_chars(text.data() + 2, text.data() + text.size(), bits, 16);
+    if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+    return bits;
+}
+
 /// Cuts `text` at the first `mark`; the part behind it is nothing when there is no mark.
 std::pair<std::string_view, std::optional<std::string_view>> cut(std::string_view text, char mark) {
     const std::size_t at = text.find(mark);
@@ -59,24 +47,46 @@ std::pair<std::string_view, std::optional<std::string_view>> cut(std::string_vie
     return {text.substr(0, at), text.substr(at + 1)};
 }
 
-double default_value(FaultKind kind) {
-    if (kind == FaultKind::exception) return 4.0;
-    if (kind == FaultKind::late) return 1.0;
-    return 0.0;
+std::string known_names() {
+    std::string names;
+    for (const FaultEntry& entry : fault_catalogue()) {
+        names += fmt::format("{}{}", names.empty() ? "" : ", ", entry.name);
+    }
+    return names;
 }
 
-bool value_fits(FaultKind kind, double value) {
-    if (kind == FaultKind::exception) return value >= 1.0 && value <= 255.0 && value == std::floor(value);
-    if (kind == FaultKind::late) return value <= 3600.0;
-    return false;
+Result<double> read_value(const FaultEntry& entry, std::optional<std::string_view> text,
+                          std::string_view whole_text) {
+    const FaultValue& value = entry.value;
+    if (!text) {
+        if (value.required) return refuse(whole_text, fmt::format("{} needs a VALUE", entry.name));
+        return value.usual;
+    }
+    if (value.name.empty()) return refuse(whole_text, fmt::format("{} takes no VALUE", entry.name));
+    const auto read = value_number(*text);
+    const bool fits =
+        read && *read >= value.least && *read <= value.most && (!value.whole || *read == std::floor(*read));
+    if (!fits) {
+        return refuse(whole_text,
+                      fmt::format("VALUE is a {} from {} to {}", value.whole ? "whole number" : "number",
+                                  value.least, value.most));
+    }
+    return *read;
 }
 
 Result<void> read_target(Fault& fault, std::string_view target, std::string_view text) {
-    if (fault.on_sensor()) {
-        const auto index = target.starts_with('T') ? number<std::size_t>(target.substr(1)) : std::nullopt;
-        if (!index || *index < 1 || *index > 16) return refuse(text, "a sensor fault acts on T1 ... T16");
-        fault.channel = *index - 1;
-        return {};
+    switch (fault.place()) {
+        case FaultPlace::sensor: {
+            const auto index = target.starts_with('T') ? number<std::size_t>(target.substr(1)) : std::nullopt;
+            if (!index || *index < 1 || *index > 16) return refuse(text, "a sensor fault acts on T1 ... T16");
+            fault.channel = *index - 1;
+            return {};
+        }
+        case FaultPlace::endpoint:
+            return refuse(text, "a fault of the socket or port itself takes no TARGET");
+        case FaultPlace::module:
+        case FaultPlace::reply:
+            break;
     }
     const auto unit = number<std::uint8_t>(target);
     if (!unit || *unit < 1 || *unit > 247)
@@ -97,102 +107,98 @@ Result<void> read_times(Fault& fault, std::string_view times, std::string_view t
     return {};
 }
 
-Bytes frame(Framing framing, std::uint16_t transaction, std::uint8_t unit, const Bytes& pdu) {
-    return framing == Framing::tcp ? tcp_frame(transaction, unit, pdu) : rtu_frame(unit, pdu);
+Result<Fault> read_kind(std::string_view what, std::string_view text) {
+    const auto [kind_and_value, target] = cut(what, ':');
+    const auto [kind_name, value_text] = cut(kind_and_value, '=');
+    const FaultEntry* entry = find_fault(kind_name);
+    if (entry == nullptr) return refuse(text, fmt::format("'{}' is none of {}", kind_name, known_names()));
+    const auto value = read_value(*entry, value_text, text);
+    if (!value) return std::unexpected(value.error());
+    Fault fault{.kind = entry->kind, .value = *value};
+    if (target) {
+        if (auto read = read_target(fault, *target, text); !read) return std::unexpected(read.error());
+    }
+    return fault;
+}
+
+/// The bits that a number has in the registers; negative numbers in two's complement.
+std::uint32_t bits_of(double value) {
+    return value < 0.0 ? static_cast<std::uint32_t>(static_cast<std::int32_t>(value))
+                       : static_cast<std::uint32_t>(value);
+}
+
+SensorState state_of(const Fault& fault) {
+    if (fault.kind == FaultKind::open) return SensorState::open;
+    if (fault.kind == FaultKind::shorted) return SensorState::shorted;
+    return SensorState::coded(bits_of(fault.value));
 }
 
 }  // namespace
 
-std::string_view to_string(FaultKind kind) {
-    for (const auto& [known, name] : names) {
-        if (kind == known) return name;
-    }
-    return "";
+Result<Fault> parse_fault_kind(std::string_view text) {
+    return read_kind(text, text);
 }
 
 Result<Fault> parse_fault(std::string_view text) {
     const auto [what, times] = cut(text, '@');
     if (!times) return refuse(text, "it has no @FROM_S");
-    const auto [kind_and_value, target] = cut(what, ':');
-    const auto [kind_name, value] = cut(kind_and_value, '=');
-
-    const auto kind = kind_from_string(kind_name);
-    if (!kind) {
-        return refuse(text,
-                      fmt::format("'{}' is none of open, short, silence, exception, late, hangup, truncated, "
-                                  "wrong-crc, wrong-tid, wrong-unit",
-                                  kind_name));
-    }
-    Fault fault{.kind = *kind, .value = default_value(*kind), .channel = {}, .unit = {}};
-    if (value) {
-        const auto parsed = seconds(*value);
-        if (!parsed || !value_fits(*kind, *parsed)) return refuse(text, "its VALUE does not fit");
-        fault.value = *parsed;
-    }
-    if (target) {
-        if (auto read = read_target(fault, *target, text); !read) return std::unexpected(read.error());
-    }
-    if (auto read = read_times(fault, *times, text); !read) return std::unexpected(read.error());
+    auto fault = read_kind(what, text);
+    if (!fault) return fault;
+    if (auto read = read_times(*fault, *times, text); !read) return std::unexpected(read.error());
     return fault;
 }
 
-SensorState sensor_state(const std::vector<Fault>& faults, std::size_t channel, double time_s) {
-    for (const Fault& fault : faults) {
-        if (!fault.on_sensor() || !fault.active(time_s) || fault.channel.value_or(channel) != channel)
-            continue;
-        return fault.kind == FaultKind::open ? SensorState::open : SensorState::shorted;
+std::string to_string(const Fault& fault) {
+    const FaultEntry& entry = entry_of(fault.kind);
+    std::string text(entry.name);
+    if (!entry.value.name.empty()) text += fmt::format("={}", fault.value);
+    if (fault.channel) text += fmt::format(":T{}", *fault.channel + 1);
+    if (fault.unit) text += fmt::format(":{}", *fault.unit);
+    text += fmt::format("@{}", fault.from_s);
+    if (std::isfinite(fault.to_s)) text += fmt::format("-{}", fault.to_s);
+    return text;
+}
+
+std::size_t FaultPlan::clear(FaultKind kind) {
+    return std::erase_if(faults_, [kind](const Fault& fault) { return fault.kind == kind; });
+}
+
+SensorState FaultPlan::sensor_state(std::size_t channel, double time_s) const {
+    for (const Fault& fault : faults_) {
+        if (fault.place() != FaultPlace::sensor || !fault.active(time_s)) continue;
+        if (fault.channel.value_or(channel) == channel) return state_of(fault);
     }
     return SensorState::healthy;
 }
 
-std::optional<Fault> line_fault(const std::vector<Fault>& faults, std::uint8_t unit, double time_s) {
-    for (const Fault& fault : faults) {
-        if (fault.on_sensor() || !fault.active(time_s) || fault.unit.value_or(unit) != unit) continue;
-        return fault;
+bool FaultPlan::frozen(std::uint8_t unit, double time_s) const {
+    return std::ranges::any_of(faults_, [&](const Fault& fault) {
+        return fault.kind == FaultKind::frozen && fault.active(time_s) && fault.unit.value_or(unit) == unit;
+    });
+}
+
+std::optional<Fault> FaultPlan::on_reply(std::uint8_t unit, double time_s) const {
+    for (const Fault& fault : faults_) {
+        if (fault.place() != FaultPlace::reply || !fault.active(time_s)) continue;
+        if (fault.unit.value_or(unit) == unit) return fault;
     }
     return std::nullopt;
 }
 
-std::vector<Delivery> deliveries(Framing framing, const ModbusRequest& request, const Bytes& pdu,
-                                 const std::optional<Fault>& fault) {
-    const auto plain = [&] { return frame(framing, request.transaction, request.unit, pdu); };
-    if (!fault) return {{.delay_s = 0.0, .bytes = plain()}};
-    switch (fault->kind) {
-        case FaultKind::open:
-        case FaultKind::shorted:
-            break;
-        case FaultKind::silence:
-            return {};
-        case FaultKind::exception: {
-            const Bytes refused = {static_cast<std::uint8_t>(request.pdu.front() | 0x80U),
-                                   static_cast<std::uint8_t>(fault->value)};
-            return {{.delay_s = 0.0, .bytes = frame(framing, request.transaction, request.unit, refused)}};
-        }
-        case FaultKind::late:
-            return {{.delay_s = fault->value, .bytes = plain()}};
-        case FaultKind::hang_up:
-            if (framing == Framing::rtu) return {};
-            return {{.delay_s = 0.0, .bytes = {}, .hang_up = true}};
-        case FaultKind::truncated: {
-            Bytes bytes = plain();
-            bytes.resize(bytes.size() - std::min<std::size_t>(3, bytes.size() - 1));
-            return {{.delay_s = 0.0, .bytes = std::move(bytes)}};
-        }
-        case FaultKind::wrong_crc: {
-            Bytes bytes = plain();
-            if (framing == Framing::rtu) bytes.back() ^= 0x5AU;
-            return {{.delay_s = 0.0, .bytes = std::move(bytes)}};
-        }
-        case FaultKind::wrong_transaction: {
-            const auto other = static_cast<std::uint16_t>(request.transaction + 1);
-            return {{.delay_s = 0.0, .bytes = frame(framing, other, request.unit, pdu)}};
-        }
-        case FaultKind::wrong_unit: {
-            const auto other = static_cast<std::uint8_t>(request.unit + 1);
-            return {{.delay_s = 0.0, .bytes = frame(framing, request.transaction, other, pdu)}};
-        }
+EndpointState FaultPlan::endpoint(double time_s) const {
+    EndpointState state;
+    for (const Fault& fault : faults_) {
+        if (!fault.active(time_s)) continue;
+        if (fault.kind == FaultKind::refuse) state.refuses = true;
+        if (fault.kind == FaultKind::half_open) state.half_open = true;
+        if (fault.kind == FaultKind::unplug) state.unplugged = true;
+        if (fault.kind == FaultKind::one_client) state.one_client_hold_s = fault.value;
     }
-    return {{.delay_s = 0.0, .bytes = plain()}};
+    return state;
+}
+
+bool FaultPlan::watches_endpoint() const {
+    return std::ranges::any_of(faults_, [](const Fault& f) { return f.place() == FaultPlace::endpoint; });
 }
 
 }  // namespace thermbal

@@ -11,6 +11,7 @@
 #include "options.hpp"
 #include "replay/recorded_scans.hpp"
 #include "reports.hpp"
+#include "simulator/control.hpp"
 #include "simulator/endpoints.hpp"
 #include "simulator/plant_source.hpp"
 #include "simulator/server.hpp"
@@ -104,38 +105,52 @@ Result<Station> station(const SimulatorOptions& options) {
         options.lockstep_s
             ? SimClock::lockstep(*options.lockstep_s)
             : SimClock::scaled(options.time_scale, options.time_epoch_ns.value_or(monotonic_ns()));
-    return Station(ModbusModule(options.map, options.units), std::move(*source), options.faults, clock,
-                   options.foreign_unit, {.on_read = std::move(*log), .on_write = print_write});
+    return Station(ModbusModule(options.map, options.units), std::move(*source), FaultPlan(options.faults),
+                   clock, options.foreign_unit, {.on_read = std::move(*log), .on_write = print_write},
+                   options.noise.seed);
 }
 
-void announce(const std::string& what) {
-    fmt::print("ready {}\n", what);
+void announce(std::string_view event, const std::string& what) {
+    fmt::print("{} {}\n", event, what);
     std::fflush(stdout);
+}
+
+Result<void> open_endpoint(Server& server, const SimulatorOptions& options) {
+    if (options.task == SimulatorTask::serve_tcp) {
+        Result<TcpEndpoint> tcp = listen_on_loopback(options.port);
+        if (!tcp) return std::unexpected(tcp.error());
+        announce("ready", fmt::format("tcp {}", fmt::join(tcp->addresses, " ")));
+        server.listen(std::move(*tcp));
+        return {};
+    }
+    return server.attach([link_path = options.link_path, first = true]() mutable {
+        Result<PtyLine> line = open_pty_line(link_path);
+        if (line) announce(first ? "ready" : "plugged", fmt::format("rtu {}", line->port.path));
+        first = false;
+        return line;
+    });
 }
 
 Result<void> serve(const SimulatorOptions& options, int stop_fd) {
     Result<Station> module = station(options);
     if (!module) return std::unexpected(module.error());
-    Server server([&module](Framing framing, const ModbusRequest& request,
-                            std::int64_t now_ns) { return module->serve(framing, request, now_ns); },
-                  ServerLimits{});
-    if (options.task == SimulatorTask::serve_tcp) {
-        Result<TcpEndpoint> tcp = listen_on_loopback(options.port);
-        if (!tcp) return std::unexpected(tcp.error());
-        announce(fmt::format("tcp {}", fmt::join(tcp->addresses, " ")));
-        server.listen(std::move(*tcp));
-        return server.run(stop_fd);
+    Server server([&module](Framing framing, const ModbusRequest& request, std::int64_t now_ns) {
+        return module->serve(framing, request, now_ns);
+    });
+    // 2 ms is short against every period; without a planned fault of the endpoint only a command can change
+    // it.
+    server.watch_endpoint([&module](std::int64_t now_ns) { return module->endpoint(now_ns); },
+                          module->plan().watches_endpoint() || !options.control_path.empty() ? 2 : 1000);
+    std::optional<ControlSocket> control;
+    if (!options.control_path.empty()) {
+        auto opened = ControlSocket::open(options.control_path, [&module](std::string_view line) {
+            return obey(line, module->plan(), module->next_s(monotonic_ns()));
+        });
+        if (!opened) return std::unexpected(opened.error());
+        control.emplace(std::move(*opened));
+        server.watch(control->fd(), [&control] { control->dispatch(); });
     }
-    Result<PtyEndpoint> pty = open_pty();
-    if (!pty) return std::unexpected(pty.error());
-    std::optional<PortLink> link;
-    if (!options.link_path.empty()) {
-        Result<PortLink> created = PortLink::create(pty->path, options.link_path);
-        if (!created) return std::unexpected(created.error());
-        link.emplace(std::move(*created));
-    }
-    announce(fmt::format("rtu {}", pty->path));
-    server.attach(std::move(*pty));
+    if (auto opened = open_endpoint(server, options); !opened) return opened;
     return server.run(stop_fd);
 }
 

@@ -1,11 +1,15 @@
 #include "options.hpp"
 
+#include <cmath>
 #include <cstdio>
+#include <fstream>
+#include <iterator>
 #include <limits>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "simulator/scenario.hpp"
 #include "simulator/spindle_head.hpp"
 
 namespace thermbal {
@@ -37,6 +41,8 @@ struct Flags {
     int first_unit = 1;
     std::string foreign_unit = "exception";
     std::vector<std::string> faults;
+    std::string scenario_path;
+    std::string control_path;
     std::string truth_log_path;
     std::optional<double> lockstep_s;
     double time_scale = 1.0;
@@ -124,13 +130,21 @@ void add_line_flags(CLI::App& app, Flags& flags) {
         ->check(CLI::IsMember({"exception", "silence"}))
         ->capture_default_str()
         ->group("Line");
-    app.add_option("--fault", flags.faults, "KIND[=VALUE][:TARGET]@FROM_S[-TO_S], several times; see below")
-        ->group("Line")
-        ->type_size(1)
-        ->allow_extra_args(false);
     app.add_option("--log-truth", flags.truth_log_path,
                    "Append to this CSV what every read of registers was sent")
         ->group("Line");
+}
+
+void add_fault_flags(CLI::App& app, Flags& flags) {
+    app.add_option("--fault", flags.faults, "KIND[=VALUE][:TARGET]@FROM_S[-TO_S], several times; see below")
+        ->group("Faults")
+        ->type_size(1)
+        ->allow_extra_args(false);
+    app.add_option("--scenario", flags.scenario_path, "A TOML file of faults and their times; see below")
+        ->group("Faults");
+    app.add_option("--control", flags.control_path,
+                   "A Unix socket that takes faults while it runs; see below")
+        ->group("Faults");
 }
 
 void add_time_flags(CLI::App& app, Flags& flags) {
@@ -196,12 +210,46 @@ Result<void> take_module(const Flags& flags, SimulatorOptions& options) {
     if (!units) return std::unexpected(units.error());
     options.units = std::move(*units);
     options.foreign_unit = flags.foreign_unit == "silence" ? ForeignUnit::silence : ForeignUnit::exception_11;
+    return {};
+}
+
+/// A fault that keeps requests away keeps time in lockstep from moving: it would never end.
+Result<void> check_lockstep(const Flags& flags, const std::vector<Fault>& faults) {
+    if (!flags.lockstep_s) return {};
+    for (const Fault& fault : faults) {
+        const bool keeps_requests_away =
+            fault.place() == FaultPlace::endpoint && fault.kind != FaultKind::one_client;
+        if (!keeps_requests_away || !std::isfinite(fault.to_s)) continue;
+        return refuse(
+            fmt::format("fault '{}' would never end: in --lockstep only requests move time, and it "
+                        "keeps them away; use --time-scale, or end it over --control",
+                        to_string(fault)));
+    }
+    return {};
+}
+
+Result<std::string> text_of(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::string text{std::istreambuf_iterator<char>(file), {}};
+    if (file.good() || file.eof()) return text;
+    return refuse(fmt::format("{}: cannot be read; name a scenario file", path));
+}
+
+Result<void> take_faults(const Flags& flags, SimulatorOptions& options) {
     for (const std::string& text : flags.faults) {
         auto fault = parse_fault(text);
         if (!fault) return std::unexpected(fault.error());
         options.faults.push_back(*fault);
     }
-    return {};
+    if (!flags.scenario_path.empty()) {
+        const auto text = text_of(flags.scenario_path);
+        if (!text) return std::unexpected(text.error());
+        const auto scenario = parse_scenario(*text, flags.scenario_path);
+        if (!scenario) return std::unexpected(scenario.error());
+        options.faults.insert(options.faults.end(), scenario->begin(), scenario->end());
+    }
+    options.control_path = flags.control_path;
+    return check_lockstep(flags, options.faults);
 }
 
 Result<SimulatorTask> task_of(const Flags& flags) {
@@ -233,6 +281,7 @@ Result<SimulatorOptions> checked(const Flags& flags) {
     options.task = *task;
     if (auto taken = take_condition(flags, options); !taken) return std::unexpected(taken.error());
     if (auto taken = take_module(flags, options); !taken) return std::unexpected(taken.error());
+    if (auto taken = take_faults(flags, options); !taken) return std::unexpected(taken.error());
     options.json = flags.json;
     options.noise = flags.noise;
     options.replay_path = flags.replay_path;
@@ -278,16 +327,22 @@ ParsedCommandLine parse_command_line(int argc, char** argv) {
         "thermbal-sim: a Modbus module with 16 PT100 inputs on a spindle head that warms up.\n"
         "It listens on loopback only, prints 'ready ...' on standard output, and ends on SIGTERM or SIGINT."};
     app.set_version_flag("--version", "thermbal-sim " THERMBAL_VERSION);
-    app.footer(
-        "Profiles (addresses from 0):\n" + known_profiles() +
-        "Faults, times on the simulated clock:\n"
-        "  open:T7@3600  short:T7@0-60              a sensor (without TARGET: all)\n"
-        "  silence  exception=4  late=0.3 (real s)  a unit's replies, e.g. exception=4:2@600-900 for unit 2\n"
-        "  hangup  truncated  wrong-crc  wrong-tid  wrong-unit\n"
-        "Exit status: 0 ended as asked, 1 a failure at run time, 2 wrong usage.");
+    app.footer("Profiles (addresses from 0):\n" + known_profiles() +
+               "Faults, with times in s on the simulated clock, e.g. open:T7@3600 or exception=4:2@600-900 "
+               "(unit 2);\n"
+               "without TARGET it acts on all channels or units; the first one of a place that is active "
+               "decides:\n" +
+               fault_help() +
+               "A --scenario holds tables [[fault]] with kind, at_s, and where they apply value, unit, "
+               "channel, for_s.\n"
+               "--control takes lines and answers each with 'ok ...' or 'error ...', e.g. by nc -U SOCKET:\n"
+               "  fault KIND[=VALUE][:TARGET] [SECONDS]   from now on (in lockstep: from the next scan on)\n"
+               "  clear [KIND]    list    time\n"
+               "Exit status: 0 ended as asked, 1 a failure at run time, 2 wrong usage.");
     Flags flags;
     add_source_flags(app, flags);
     add_line_flags(app, flags);
+    add_fault_flags(app, flags);
     add_time_flags(app, flags);
     add_offline_flags(app, flags);
     try {

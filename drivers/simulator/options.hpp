@@ -35,7 +35,8 @@ struct SimulatorOptions {
     RegisterMap map;
     std::vector<ModuleUnit> units;
     ForeignUnit foreign_unit = ForeignUnit::exception_11;
-    std::vector<Fault> faults;
+    std::vector<Fault> faults;  ///< of --fault and of the scenario
+    std::string control_path;
     std::string truth_log_path;
 
     std::optional<double> lockstep_s;

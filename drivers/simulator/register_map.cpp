@@ -131,9 +131,10 @@ std::optional<WordOrder> word_order_from_string(std::string_view name) {
 
 std::vector<std::uint16_t> encode_channel(const RegisterMap& map, double value_C, SensorState state) {
     std::uint32_t code = map.open_code;
-    if (state == SensorState::shorted) code = map.short_code;
+    if (state.kind == SensorState::shorted) code = map.short_code;
+    if (state.kind == SensorState::as_coded) code = state.code;
     // A source without a value is a module without a sensor: there is no number to make up.
-    if (state == SensorState::healthy && std::isfinite(value_C)) code = healthy_code(map, value_C);
+    if (state.kind == SensorState::healthy && std::isfinite(value_C)) code = healthy_code(map, value_C);
     if (map.encoding == Encoding::int16) return {static_cast<std::uint16_t>(code & 0xFFFFU)};
     return two_words(code, map.word_order);
 }

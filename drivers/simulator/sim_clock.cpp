@@ -26,9 +26,14 @@ SimClock SimClock::lockstep(double period_s) {
 }
 
 double SimClock::time_of_request_s(std::int64_t now_ns, bool begins_scan) {
-    if (period_s_ <= 0.0) return std::max(0.0, static_cast<double>(now_ns - epoch_ns_) * 1e-9 * factor_);
+    if (!is_lockstep()) return next_s(now_ns);
     if (begins_scan) ++scans_;
     return scans_ == 0 ? 0.0 : static_cast<double>(scans_ - 1) * period_s_;
+}
+
+double SimClock::next_s(std::int64_t now_ns) const {
+    if (!is_lockstep()) return std::max(0.0, static_cast<double>(now_ns - epoch_ns_) * 1e-9 * factor_);
+    return static_cast<double>(scans_) * period_s_;
 }
 
 }  // namespace thermbal

@@ -22,7 +22,7 @@ struct Rig {
                                                              {.id = 2, .first_channel = 8, .channels = 8}}),
                   {.read_C = [](double time_s) { return std::vector<double>(16, time_s / 10.0); },
                    .run_spindle = [this](double time_s, bool run) { spindle.emplace_back(time_s, run); }},
-                  std::move(faults), clock, foreign,
+                  FaultPlan(std::move(faults)), clock, foreign,
                   {.on_read = [this](const AnsweredRead& read) { reads.push_back(read); },
                    .on_write = [this](double, std::uint8_t,
                                       const ModuleWrite& write) { writes.push_back(write); }}) {}
@@ -93,6 +93,32 @@ TEST(Station, ASensorFaultShowsInItsUnitOnly) {
     rig.ask(2, read_all);
     EXPECT_THAT(rig.reads[0].words, ElementsAre(0, 0, 0, 0, 0, 0, 0, 0));
     EXPECT_THAT(rig.reads[1].words, ElementsAre(0, 0x7FFF, 0, 0, 0, 0, 0, 0));
+}
+
+TEST(Station, AFrozenUnitRepeatsItsLastReadUntilItThaws) {
+    Rig rig({*parse_fault("frozen:2@30-60")}, SimClock::lockstep(15.0));
+    for (int scan = 0; scan < 6; ++scan) {
+        rig.ask(1, {4, 0, 0, 0, 1});
+        rig.ask(2, {4, 0, 0, 0, 1});
+    }
+    std::vector<int> first;
+    std::vector<int> second;
+    std::vector<std::string> said;
+    for (std::size_t i = 0; i < rig.reads.size(); i += 2) {
+        first.push_back(rig.reads[i].words[0]);
+        second.push_back(rig.reads[i + 1].words[0]);
+        said.push_back(rig.reads[i + 1].fault);
+    }
+    EXPECT_THAT(first, ElementsAre(0, 15, 30, 45, 60, 75));
+    EXPECT_THAT(second, ElementsAre(0, 15, 15, 15, 60, 75));
+    EXPECT_THAT(said, ElementsAre("", "", "frozen", "frozen", "", ""));
+}
+
+TEST(Station, EveryCodeCanBeServed) {
+    Rig rig({*parse_fault("code=-30000:T1@0"), *parse_fault("code=0x7FFE:T2@0")}, SimClock::lockstep(15.0));
+    rig.ask(1, read_all);
+    EXPECT_EQ(rig.reads[0].words[0], 0x8AD0);
+    EXPECT_EQ(rig.reads[0].words[1], 0x7FFE);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -49,5 +50,14 @@ class PortLink {
     explicit PortLink(std::string path) : path_(std::move(path)) {}
     std::string path_;
 };
+
+/// A pseudo-terminal and the link that points to it.
+struct PtyLine {
+    PtyEndpoint port;
+    std::optional<PortLink> link = {};
+};
+
+/// open_pty, and PortLink::create where `link_path` is not empty.
+Result<PtyLine> open_pty_line(const std::string& link_path);
 
 }  // namespace thermbal

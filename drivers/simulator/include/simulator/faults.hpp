@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -8,58 +9,65 @@
 #include <vector>
 
 #include "base/error.hpp"
-#include "simulator/frames.hpp"
+#include "simulator/fault_catalogue.hpp"
 #include "simulator/register_map.hpp"
 
 namespace thermbal {
 
-enum class FaultKind : std::uint8_t {
-    open,               ///< sensor: the module's code for a broken lead
-    shorted,            ///< sensor: the module's code for a short
-    silence,            ///< no reply
-    exception,          ///< exception `value` instead of the reply
-    late,               ///< the reply comes `value` real seconds late
-    hang_up,            ///< TCP: the connection is closed instead of a reply; RTU: no reply
-    truncated,          ///< the last bytes of the reply are missing
-    wrong_crc,          ///< RTU only
-    wrong_transaction,  ///< TCP only
-    wrong_unit,         ///< the reply carries another unit id
-};
-
 /// What goes wrong, where, and from when to when on the simulated clock.
 struct Fault {
     FaultKind kind = FaultKind::silence;
-    double value = 0.0;                       ///< exception code, or seconds late
+    double value = 0.0;                       ///< what FaultEntry::value says
     std::optional<std::size_t> channel = {};  ///< sensor faults: T1 is 0; nothing: every channel
-    std::optional<std::uint8_t> unit = {};    ///< faults of the line; nothing: every unit
+    std::optional<std::uint8_t> unit = {};    ///< faults of a module or reply; nothing: every unit
     double from_s = 0.0;
     double to_s = std::numeric_limits<double>::infinity();
 
-    bool on_sensor() const { return kind == FaultKind::open || kind == FaultKind::shorted; }
+    FaultPlace place() const { return entry_of(kind).place; }
     bool active(double time_s) const { return time_s >= from_s && time_s < to_s; }
 };
 
-std::string_view to_string(FaultKind kind);
+/// `KIND[=VALUE][:TARGET]`, e.g. `open:T7`, `exception=4:2` (unit 2), `late=0.3`; from 0 s on, for ever.
+/// Errors (refuse_input) say what would be accepted.
+Result<Fault> parse_fault_kind(std::string_view text);
 
-/// `KIND[=VALUE][:TARGET]@FROM_S[-TO_S]`, e.g. `open:T7@3600`, `exception=4:2@600-900` (unit 2),
-/// `late=0.3@0-60`.
+/// `KIND[=VALUE][:TARGET]@FROM_S[-TO_S]`, e.g. `open:T7@3600`, `exception=4:2@600-900`.
 Result<Fault> parse_fault(std::string_view text);
 
-/// The state of one sensor; the first fault of the list that is active decides.
-SensorState sensor_state(const std::vector<Fault>& faults, std::size_t channel, double time_s);
-/// What is wrong on the line to a unit; the first fault of the list that is active decides.
-std::optional<Fault> line_fault(const std::vector<Fault>& faults, std::uint8_t unit, double time_s);
+/// As parse_fault accepts it.
+std::string to_string(const Fault& fault);
 
-/// Bytes to send after a delay, then perhaps the end of the connection.
-struct Delivery {
-    double delay_s = 0.0;
-    Bytes bytes = {};
-    bool hang_up = false;
+/// What is wrong with the socket or the port itself.
+struct EndpointState {
+    bool refuses = false;
+    bool half_open = false;
+    bool unplugged = false;
+    std::optional<double> one_client_hold_s;
+
+    bool operator==(const EndpointState&) const = default;
 };
 
-/// How the reply `pdu` to a request goes over the wire, with a fault on it. A fault that the framing does not
-/// know (a CRC over TCP, a transaction over RTU) leaves the reply as it is.
-std::vector<Delivery> deliveries(Framing framing, const ModbusRequest& request, const Bytes& pdu,
-                                 const std::optional<Fault>& fault);
+/// The faults that are planned. Of several that are active at one place the first one decides.
+class FaultPlan {
+  public:
+    FaultPlan() = default;
+    explicit FaultPlan(std::vector<Fault> faults) : faults_(std::move(faults)) {}
+
+    void add(const Fault& fault) { faults_.push_back(fault); }
+    void clear() { faults_.clear(); }
+    /// Takes all faults of this kind out; how many there were.
+    std::size_t clear(FaultKind kind);
+    const std::vector<Fault>& faults() const { return faults_; }
+
+    SensorState sensor_state(std::size_t channel, double time_s) const;
+    bool frozen(std::uint8_t unit, double time_s) const;
+    std::optional<Fault> on_reply(std::uint8_t unit, double time_s) const;
+    EndpointState endpoint(double time_s) const;
+    /// Whether the state of the endpoint may change without anybody doing anything.
+    bool watches_endpoint() const;
+
+  private:
+    std::vector<Fault> faults_;
+};
 
 }  // namespace thermbal

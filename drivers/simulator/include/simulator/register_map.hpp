@@ -14,7 +14,22 @@ enum class Encoding : std::uint8_t { int16, int32, float32 };
 /// Order of the bytes of a 32-bit value in two registers; `a` is the most significant.
 enum class WordOrder : std::uint8_t { abcd, cdab, badc, dcba };
 
-enum class SensorState : std::uint8_t { healthy, open, shorted };
+/// What the module writes for a channel: a temperature, its code for a broken lead or a short, or `code` as
+/// it is.
+struct SensorState {
+    enum Kind : std::uint8_t { healthy, open, shorted, as_coded };
+    Kind kind = healthy;
+    std::uint32_t code = 0;
+
+    // NOLINTNEXTLINE(google-explicit-constructor): SensorState::open is a state
+    constexpr SensorState(Kind of_kind = healthy) : kind(of_kind) {}
+    static constexpr SensorState coded(std::uint32_t bits) {
+        SensorState state(as_coded);
+        state.code = bits;
+        return state;
+    }
+    bool operator==(const SensorState&) const = default;
+};
 
 /// Where one kind of module keeps its temperatures, and how it writes them.
 struct RegisterMap {

@@ -20,6 +20,10 @@ class SimClock {
     /// ModbusModule::begins_scan.
     double time_of_request_s(std::int64_t now_ns, bool begins_scan);
 
+    /// The time of whatever comes next: now, or in lockstep the next scan.
+    double next_s(std::int64_t now_ns) const;
+    bool is_lockstep() const { return period_s_ > 0.0; }
+
   private:
     double factor_ = 1.0;
     std::int64_t epoch_ns_ = 0;

@@ -2,9 +2,12 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <random>
 #include <string>
 #include <vector>
 
+#include "simulator/deliveries.hpp"
 #include "simulator/faults.hpp"
 #include "simulator/frames.hpp"
 #include "simulator/module.hpp"
@@ -28,7 +31,7 @@ struct AnsweredRead {
     std::uint8_t unit = 0;
     std::uint8_t function = 0;
     std::uint16_t address = 0;
-    std::string fault;  ///< what then happened on the line; empty for a clean reply
+    std::string fault;  ///< what then happened on the line, or "frozen"; empty for a clean reply
     std::vector<std::uint16_t> words;
 };
 
@@ -41,23 +44,33 @@ struct StationListeners {
 /// A module on a line: takes requests, gives what goes back over the wire. One thread.
 class Station {
   public:
-    Station(ModbusModule module, ScanSource source, std::vector<Fault> faults, SimClock clock,
-            ForeignUnit foreign_unit, StationListeners listeners);
+    Station(ModbusModule module, ScanSource source, FaultPlan plan, SimClock clock, ForeignUnit foreign_unit,
+            StationListeners listeners, std::uint64_t noise_seed = 1);
 
     std::vector<Delivery> serve(Framing framing, const ModbusRequest& request, std::int64_t now_ns);
 
+    /// What is wrong with the socket or port itself.
+    EndpointState endpoint(std::int64_t now_ns) const { return plan_.endpoint(next_s(now_ns)); }
+    FaultPlan& plan() { return plan_; }
+    const FaultPlan& plan() const { return plan_; }
+    double next_s(std::int64_t now_ns) const { return clock_.next_s(now_ns); }
+
   private:
     std::vector<Delivery> serve_foreign(Framing framing, const ModbusRequest& request);
-    void report(const ModbusRequest& request, const ModuleReply& reply, const std::optional<Fault>& fault,
+    void report(const ModbusRequest& request, const ModuleReply& reply, const std::string& fault,
                 double time_s);
     ModuleInputs inputs_at(double time_s);
+    /// What a unit measures: now, or while it is frozen what it measured last.
+    const ModuleInputs& measured(std::uint8_t unit, double time_s);
 
     ModbusModule module_;
     ScanSource source_;
-    std::vector<Fault> faults_;
+    FaultPlan plan_;
     SimClock clock_;
     ForeignUnit foreign_unit_;
     StationListeners listeners_;
+    std::mt19937_64 random_;
+    std::map<std::uint8_t, ModuleInputs> measured_;  ///< by unit, at its last read
 };
 
 }  // namespace thermbal
