@@ -1,0 +1,57 @@
+#include <cmath>
+
+#include "network/effect.hpp"
+#include "network_builder.hpp"
+
+namespace thermbal {
+namespace {
+
+void attach(const PlacedEffect& effect, NetworkBuilder& network) {
+    const double power_W = effect.values[0];
+    const double time_constant_s = effect.values[1];
+    const std::size_t source = effect.at;
+    network.add_heat(
+        network.node_of_source(source),
+        [=](const NetworkState& state) {
+            return power_W * state.source_drive[source] * std::exp(-state.time_s / time_constant_s);
+        },
+        Variation::smooth);
+}
+
+}  // namespace
+
+EffectDefinition run_in_heat_effect() {
+    return {.kind = "run_in_heat",
+            .summary = "additional bearing heat that dies away in time, whatever the temperature",
+            .where = "a source",
+            .forms =
+                {{.name = "exponential",
+                  .site = EffectSite::source,
+                  .equation =
+                      "+ power_W * drive * exp(-t / time_constant_s), drive as the source's column scales it",
+                  .parameters = {{.name = "power_W",
+                                  .lower = 1e-3,
+                                  .upper = 10,
+                                  .prior_centre = 0.3,
+                                  .prior_sigma = 1,
+                                  .logarithmic = true,
+                                  .prior_unit = PriorUnit::mean_source_power},
+                                 {.name = "time_constant_s",
+                                  .lower = 120,
+                                  .upper = 36000,
+                                  .prior_centre = 2400,
+                                  .prior_sigma = 0.8,
+                                  .logarithmic = true}}}},
+            .source =
+                "grease churning: high torque that drops to its steady value, up to 10 h (Tribology "
+                "International 108375; "
+                "NSK TechTalk on run-in)",
+            .look_alikes = {"friction_viscosity", "slow_structure", "ambient_drift"},
+            .told_apart_by =
+                "a second run on the same day or a warm start: friction that follows temperature starts low "
+                "then, "
+                "run-in that is over does not come back",
+            .attach = attach};
+}
+
+}  // namespace thermbal

@@ -1,0 +1,233 @@
+#include "integrator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "phi.hpp"
+
+namespace thermbal {
+namespace {
+
+using Eigen::Index;
+
+constexpr double runaway_C = 1e5;
+constexpr int most_halvings = 16;
+constexpr int most_switchings = 20'000;
+
+std::unexpected<Error> run_away(double time_s) {
+    return fail(NextStep::stop, fmt::format("the temperatures run away at {:.0f} s", time_s));
+}
+
+}  // namespace
+
+Integrator::Integrator(const CompiledNetwork& network, InputSchedule& schedule, SensorChain& sensors,
+                       const SimulationOptions& options)
+    : network_(network),
+      heat_(network, schedule),
+      sensors_(sensors),
+      options_(options),
+      start_s_(schedule.start_s()),
+      breaks_s_(schedule.jumps_s()),
+      regimes_(regimes_of(network)),
+      known_factors_(8) {
+    heat_W_.setZero(static_cast<Index>(network.node_names.size()));
+    breaks_s_.insert(breaks_s_.end(), network.breaks_s.begin(), network.breaks_s.end());
+}
+
+std::vector<double> Integrator::grid(std::span<const double> sample_times_s) const {
+    const double end_s = sample_times_s.empty() ? start_s_ : sample_times_s.back();
+    std::vector<double> moments(sample_times_s.begin(), sample_times_s.end());
+    moments.push_back(start_s_);
+    std::ranges::copy_if(breaks_s_, std::back_inserter(moments),
+                         [&](double time_s) { return time_s > start_s_ && time_s < end_s; });
+    std::ranges::sort(moments);
+    moments.erase(std::ranges::unique(moments).begin(), moments.end());
+    return moments;
+}
+
+void Integrator::enter_regime(std::size_t regime) {
+    system_ = &regimes_[regime].system;
+    modal_ = system_->modal_from_temperatures(node_C_);
+    for (StepFactors& known : known_factors_) known.h_s = 0.0;
+}
+
+const Integrator::StepFactors& Integrator::factors(double h_s) {
+    for (const StepFactors& known : known_factors_) {
+        if (known.h_s == h_s) return known;
+    }
+    StepFactors& made = known_factors_[oldest_factors_];
+    oldest_factors_ = (oldest_factors_ + 1) % known_factors_.size();
+    const Index modes = system_->rate_per_s.size();
+    made.h_s = h_s;
+    for (Eigen::ArrayXd* array : {&made.decay, &made.decay_half, &made.half, &made.whole, &made.second,
+                                  &made.begin, &made.middle, &made.end}) {
+        array->resize(modes);
+    }
+    for (Index i = 0; i < modes; ++i) {
+        const double z = -system_->rate_per_s[i] * h_s;
+        const auto phi = phi_functions<4>(z);
+        made.decay[i] = phi[0];
+        made.whole[i] = h_s * phi[1];
+        if (!network_.smooth) continue;
+        const auto phi_half = phi_functions<4>(0.5 * z);
+        made.decay_half[i] = phi_half[0];
+        made.half[i] = 0.5 * h_s * phi_half[1];
+        made.second[i] = 2.0 * h_s * phi[2];
+        made.begin[i] = h_s * (phi[1] - 3.0 * phi[2] + 4.0 * phi[3]);
+        made.middle[i] = h_s * (4.0 * phi[2] - 8.0 * phi[3]);
+        made.end[i] = h_s * (4.0 * phi[3] - phi[2]);
+    }
+    return made;
+}
+
+void Integrator::modal_heat(double time_s, const Eigen::VectorXd& node_C, Eigen::VectorXd& modal_heat) {
+    heat_.evaluate(time_s, node_C, system_->surface_W_per_K, heat_W_);
+    modal_heat.noalias() = system_->to_modal * heat_W_;
+}
+
+void Integrator::exact_step(double h_s) {
+    const StepFactors& f = factors(h_s);
+    next_modal_ = f.decay * modal_.array() + f.whole * begin_.array();
+    next_C_.noalias() = system_->to_nodal * next_modal_;
+}
+
+double Integrator::smooth_step(double from_s, double h_s) {
+    const StepFactors& f = factors(h_s);
+    next_modal_ = f.decay_half * modal_.array() + f.half * begin_.array();
+    stage_C_.noalias() = system_->to_nodal * next_modal_;
+    modal_heat(from_s + 0.5 * h_s, stage_C_, middle_);
+    next_modal_ = f.decay * modal_.array() + f.whole * (2.0 * middle_ - begin_).array();
+    stage_C_.noalias() = system_->to_nodal * next_modal_;
+    modal_heat(from_s + h_s, stage_C_, end_);
+    next_modal_ = f.decay * modal_.array() + f.begin * begin_.array() + f.middle * middle_.array() +
+                  f.end * end_.array();
+    next_C_.noalias() = system_->to_nodal * next_modal_;
+    end_ = (f.begin - f.whole + f.second) * begin_.array() + (f.middle - f.second) * middle_.array() +
+           f.end * end_.array();
+    stage_C_.noalias() = system_->to_nodal * end_;
+    return stage_C_.lpNorm<Eigen::Infinity>();
+}
+
+double Integrator::try_step(double from_s, double h_s) {
+    if (network_.smooth) return smooth_step(from_s, h_s);
+    exact_step(h_s);
+    return 0.0;
+}
+
+bool Integrator::crosses(std::size_t thermostat, const Eigen::VectorXd& node_C) const {
+    const Thermostat& one = network_.thermostats[thermostat];
+    const double temperature_C = node_C[static_cast<Index>(one.node)];
+    return heat_.thermostat_on(thermostat) ? temperature_C < one.off_C : temperature_C > one.on_C;
+}
+
+double Integrator::shorten_to_switching(double from_s, double h_s) {
+    const auto any_crosses = [this] {
+        for (std::size_t i = 0; i < network_.thermostats.size(); ++i) {
+            if (crosses(i, next_C_)) return true;
+        }
+        return false;
+    };
+    if (!any_crosses()) return h_s;
+    // Just behind the crossing, so that the next step begins switched.
+    double before = 0.0;
+    double behind = h_s;
+    while (behind - before > 1e-6 * options_.max_step_s) {
+        const double middle = 0.5 * (before + behind);
+        try_step(from_s, middle);
+        (any_crosses() ? behind : before) = middle;
+    }
+    try_step(from_s, behind);
+    return behind;
+}
+
+void Integrator::switch_thermostats() {
+    for (std::size_t i = 0; i < network_.thermostats.size(); ++i) {
+        if (!crosses(i, node_C_)) continue;
+        heat_.switch_thermostat(i, !heat_.thermostat_on(i));
+        ++switchings_;
+    }
+}
+
+void Integrator::accept(double from_s, double h_s) {
+    ++steps_;
+    if (sensors_.needs_slopes()) {
+        from_slope_.noalias() = system_->to_nodal * (begin_ - system_->rate_per_s.cwiseProduct(modal_));
+        modal_heat(from_s + h_s, next_C_, end_);
+        to_slope_.noalias() = system_->to_nodal * (end_ - system_->rate_per_s.cwiseProduct(next_modal_));
+        sensors_.advance({from_s, from_s + h_s, node_C_, next_C_, from_slope_, to_slope_,
+                          heat_.ambient_C(from_s), heat_.ambient_C(from_s + h_s)});
+    }
+    node_C_.swap(next_C_);
+    modal_.swap(next_modal_);
+    switch_thermostats();
+}
+
+Result<void> Integrator::advance(double from_s, double to_s) {
+    for (double time_s = from_s; time_s < to_s;) {
+        const double left_s = to_s - time_s;
+        double h_s = std::min(std::ldexp(to_s - from_s, -halvings_), left_s);
+        heat_.begin_step(time_s, time_s + h_s);
+        modal_heat(time_s, node_C_, begin_);
+        double error_C = try_step(time_s, h_s);
+        while (!(error_C <= options_.tolerance_C)) {
+            if (++halvings_ > most_halvings) return run_away(time_s);
+            h_s *= 0.5;
+            error_C = try_step(time_s, h_s);
+        }
+        if (!network_.thermostats.empty()) h_s = shorten_to_switching(time_s, h_s);
+        if (!(next_C_.lpNorm<Eigen::Infinity>() < runaway_C)) return run_away(time_s);
+        accept(time_s, h_s);
+        if (switchings_ > most_switchings) {
+            return fail(NextStep::stop, fmt::format("a thermostat switches without end at {:.0f} s", time_s));
+        }
+        time_s = h_s >= left_s ? to_s : time_s + h_s;
+        if (halvings_ > 0 && error_C < options_.tolerance_C / 16.0) --halvings_;
+    }
+    return {};
+}
+
+double Integrator::longest_step_s() const {
+    // Between the ends of a step a lagging sensor sees a cubic.
+    constexpr double with_lag_s = 15.0;
+    if (sensors_.needs_slopes()) return std::min(with_lag_s, options_.max_step_s);
+    if (network_.smooth || !network_.thermostats.empty()) return options_.max_step_s;
+    return std::numeric_limits<double>::infinity();
+}
+
+Result<void> Integrator::run(const Eigen::VectorXd& initial_C, std::span<const double> sample_times_s,
+                             const AtSample& at_sample) {
+    const std::vector<double> moments = grid(sample_times_s);
+    const double longest_s = longest_step_s();
+    std::size_t regime = 0;
+    auto sample = sample_times_s.begin();
+    node_C_ = initial_C;
+    enter_regime(regime);
+    heat_.begin_step(moments.front(), moments.front());
+    sensors_.begin(moments.front(), node_C_, heat_.ambient_C(moments.front()));
+    switch_thermostats();
+    for (std::size_t i = 0;; ++i) {
+        if (sample != sample_times_s.end() && *sample == moments[i]) {
+            heat_.begin_step(moments[i], moments[i]);
+            at_sample(static_cast<std::size_t>(sample - sample_times_s.begin()), node_C_,
+                      heat_.ambient_C(moments[i]));
+            ++sample;
+        }
+        if (i + 1 == moments.size()) return {};
+        while (regime + 1 < regimes_.size() && regimes_[regime + 1].from_s <= moments[i])
+            enter_regime(++regime);
+        const double whole_s = moments[i + 1] - moments[i];
+        const double parts = std::isinf(longest_s) ? 1.0 : std::ceil(whole_s / longest_s - 1e-9);
+        for (double part = 0.0; part < parts; part += 1.0) {
+            const double to_s =
+                part + 1.0 < parts ? moments[i] + whole_s * (part + 1.0) / parts : moments[i + 1];
+            if (auto advanced = advance(moments[i] + whole_s * part / parts, to_s); !advanced)
+                return advanced;
+        }
+    }
+}
+
+}  // namespace thermbal
