@@ -9,28 +9,35 @@
 namespace thermbal {
 
 /// The recursive alternative of Xia et al. 2014 (doi 10.1631/jzus.A1400074): an adaptive unscented Kalman
-/// filter.
+/// filter. The time constants are a machine tool's, a fast and a slow one; both are known beforehand to their
+/// `log_..._sd` and forget what they have learnt over `memory_min`, which keeps the interval honest while
+/// more modes than two die away.
 struct KalmanOptions {
     double period_s = 15.0;
-    double initial_time_constant_min = 40.0;
-    double initial_log_time_constant_sd = 0.8;
-    double initial_slope_sd_C_per_min = 1.0;
-    double measurement_sd_C = 0.06;         ///< start value; adapts
-    double slope_walk_share = 0.002;        ///< process noise a step, of the slope: lets other modes in
-    double log_time_constant_walk = 0.002;  ///< the rate slows as fast modes die away
-    double forgetting = 0.99;  ///< of the adaptive noise estimate (Sage and Husa 1969), per sample
-    double spike_sds = 8.0;    ///< an innovation beyond this many of its own deviations is a spike ...
-    int spikes_in_a_row = 4;   ///< ... unless this many follow each other: then the channel has moved
+    double fast_time_constant_min = 10.0;
+    double log_fast_sd = 0.6;
+    double slow_time_constant_min = 55.0;
+    double log_slow_sd = 0.35;
+    double memory_min = 60.0;
+    double fast_slope_sd_C_per_min = 0.5;
+    double slow_slope_sd_C_per_min = 0.2;
+    double measurement_sd_C = 0.06;   ///< start value; adapts
+    double slope_walk_share = 0.002;  ///< process noise a step, of each slope
+    double forgetting = 0.99;         ///< of the adaptive noise estimate (Sage and Husa 1969), per sample
+    double spike_sds = 8.0;           ///< an innovation beyond this many of its own deviations is a spike ...
+    int spikes_in_a_row = 4;  ///< ... unless this many follow each other: the channel has moved, begin anew
 
     Result<void> check() const;
 };
 
-/// One channel. State: temperature T, slope D and logarithm of the time constant tau, which early samples see
-/// almost linearly; the equilibrium is E = T + D tau (with E itself as a state the filter locks on to early
-/// noise):
-///     T' = T + D tau (1 - exp(-dt/tau)),   D' = D exp(-dt/tau),   log tau' = log tau,   y = T + noise.
-/// O(1) memory and work a sample. Symmetric sigma points (Julier and Uhlmann 1997); the measurement noise
-/// adapts to the innovations. Its interval is a single exponential's: see the README for how often it holds.
+/// One channel. State: temperature T, and of a fast and a slow exponential the slope D and the logarithm of
+/// the time constant tau, which early samples see almost linearly; the equilibrium is E = T + D_f tau_f + D_s
+/// tau_s (with E itself as a state the filter locks on to early noise):
+///     T' = T + sum D tau (1 - exp(-dt/tau)),   D' = D exp(-dt/tau),   y = T + noise,
+/// the log tau an Ornstein-Uhlenbeck process about what is known beforehand. O(1) memory and work a sample.
+/// Symmetric sigma points (Julier and Uhlmann 1997); the measurement noise adapts to the innovations. With
+/// one exponential alone the start of a distant sensor, which bends upwards, is taken for a time constant of
+/// hours. How often its interval holds: README.
 class AdaptiveUnscentedKalman {
   public:
     explicit AdaptiveUnscentedKalman(const KalmanOptions& options) : options_(options) {}
@@ -42,7 +49,7 @@ class AdaptiveUnscentedKalman {
     double temperature_C() const { return state_[0]; }
     double steady_state_C() const { return settled().mean_C; }
     double steady_state_sd_C() const { return settled().sd_C; }
-    double time_constant_min() const;
+    double slow_time_constant_min() const;
     double measurement_sd_C() const;
     /// Since the first scan that was added: when 95 % of the way from it to the steady state is done; the
     /// past if it is over.
@@ -50,7 +57,7 @@ class AdaptiveUnscentedKalman {
     std::size_t samples() const { return samples_; }
 
   private:
-    static constexpr std::size_t size = 3;
+    static constexpr std::size_t size = 5;
     using State = std::array<double, size>;
     using Covariance = std::array<std::array<double, size>, size>;
 
@@ -58,11 +65,14 @@ class AdaptiveUnscentedKalman {
         double mean_C;
         double sd_C;
     };
-    Settled settled() const;  ///< the unscented transform of T + D tau
+    Settled settled() const;  ///< the unscented transform of E
     std::array<State, 2 * size> sigma_points() const;
     void start(double temperature_C);
+    static void clamp_time_constants(State& state);
+    State moved(State state) const;
+    void add_process_noise();
     void predict();
-    bool is_spike(double temperature_C);
+    bool is_far(double temperature_C);  ///< and counts how many were in a row
     void update(double temperature_C);
 
     KalmanOptions options_;
