@@ -63,6 +63,9 @@ class TableReader {
     const toml::table* table(std::string_view key);
     std::vector<const toml::table*> tables(std::string_view key);
 
+    /// A key that is not judged: no complaint that it is unknown.
+    void leave(std::string_view key) { taken_.emplace(key); }
+
     bool has(std::string_view key) const { return table_.contains(key); }
     void require(std::string_view key, std::string_view accepted);
     void complain(std::string_view key, std::string_view what);

@@ -22,7 +22,7 @@ class Checker {
         check_model_table();
         for (std::size_t i = 0; i < model_.nodes.size(); ++i) check_node(i);
         for (std::size_t i = 0; i < model_.links.size(); ++i) check_link(i);
-        check_connected();
+        if (mistakes_.empty()) check_connected();
         for (std::size_t i = 0; i < model_.sources.size(); ++i) check_source(i);
         for (std::size_t i = 0; i < model_.sensors.size(); ++i) check_sensor(i);
         for (std::size_t i = 0; i < model_.effects.size(); ++i) check_effect(i);
