@@ -9,9 +9,11 @@ namespace thermbal {
 
 /// status, channels, predictions, curve, samples, events, health, watch, start, stop, annotate.
 void add_daemon_commands(CLI::App& app, int& status);
-/// tests, export, verify, backup, ports.
+/// tests, export, verify, backup, track-record, ports.
 void add_database_commands(CLI::App& app, int& status);
-/// identify, replay.
+/// identify, replay, compare, learn.
 void add_offline_commands(CLI::App& app, int& status);
+/// simulate, calibrate.
+void add_model_commands(CLI::App& app, int& status);
 
 }  // namespace thermbal

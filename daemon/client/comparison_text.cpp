@@ -2,29 +2,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "columns.hpp"
 #include "fields.hpp"
+#include "report/verdict_json.hpp"
+#include "statistics.hpp"
 
 namespace thermbal {
 namespace {
 
 using nlohmann::json;
-
-std::optional<double> median(std::vector<double> values) {
-    if (values.empty()) return std::nullopt;
-    std::ranges::sort(values);
-    const std::size_t half = values.size() / 2;
-    return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
-}
-
-json or_null(std::optional<double> value) {
-    return value ? json(*value) : json(nullptr);
-}
 
 /// What one estimator does at one window over all channels that settled.
 json estimator_summary(const json& document, std::size_t window, const std::string& estimator) {
@@ -41,7 +31,7 @@ json estimator_summary(const json& document, std::size_t window, const std::stri
     }
     const auto worst = std::ranges::max_element(errors_C);
     return {{"answers", errors_C.size()},
-            {"median_error_C", or_null(median(errors_C))},
+            {"median_error_C", number_or_null(median(errors_C))},
             {"worst_error_C", worst == errors_C.end() ? json(nullptr) : json(*worst)},
             {"held_share", intervals == 0 ? json(nullptr) : json(static_cast<double>(held) / intervals)}};
 }
@@ -135,7 +125,7 @@ json comparison_summary(const json& document) {
             estimators[name] = estimator_summary(document, window, name);
         }
         rows.push_back({{"window_end_min", channels[0]["windows"][window]["window_end_min"]},
-                        {"median_least_half_width_C", or_null(median(limits_C))},
+                        {"median_least_half_width_C", number_or_null(median(limits_C))},
                         {"estimators", std::move(estimators)}});
     }
     return rows;

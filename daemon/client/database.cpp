@@ -31,12 +31,6 @@ Result<std::string> database_path(const DatabaseOptions& options) {
     return path;
 }
 
-Result<Reader> open_database(const DatabaseOptions& options) {
-    const auto path = database_path(options);
-    if (!path) return std::unexpected(path.error());
-    return Reader::open(*path);
-}
-
 Result<TestId> wanted_test(const Reader& reader, std::optional<std::int64_t> test) {
     if (test) return *test;
     const auto newest = reader.newest_test();
@@ -69,6 +63,12 @@ json test_json(const StoredTest& test) {
 }
 
 }  // namespace
+
+Result<Reader> open_database(const DatabaseOptions& options) {
+    const auto path = database_path(options);
+    if (!path) return std::unexpected(path.error());
+    return Reader::open(*path);
+}
 
 int run_tests(const DatabaseOptions& options) {
     const auto reader = open_database(options);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "ask.hpp"
+#include "store/reader.hpp"
 
 namespace thermbal {
 
@@ -12,6 +13,9 @@ struct DatabaseOptions {
     AskOptions ask;  ///< the daemon that says where its database is, when `database` is empty
     std::string database;
 };
+
+/// By its name, or by the daemon that answers. Read only.
+Result<Reader> open_database(const DatabaseOptions& options);
 
 // On the database itself, beside a running daemon or without one. Each returns the exit status.
 

@@ -3,6 +3,7 @@
 #include "commands.hpp"
 #include "database.hpp"
 #include "serial_ports.hpp"
+#include "track_record.hpp"
 
 namespace thermbal {
 namespace {
@@ -67,6 +68,20 @@ void add_backup(CLI::App& app, int& status) {
     command.callback([&status, options, copy] { status = run_backup(*options, *copy); });
 }
 
+void add_track_record(CLI::App& app, int& status) {
+    CLI::App& command = add_command(app, "track-record",
+                                    "every declaration made with keep_measuring, against what then happened");
+    const auto options = std::make_shared<TrackRecordOptions>();
+    command
+        .add_option("--tolerance-C", options->tolerance_C,
+                    "how close a prediction has to be for the earliest honest time")
+        ->capture_default_str()
+        ->check(CLI::Range(0.01, 10.0));
+    add_database_flags(command, options->database);
+    add_json_flag(command, options->database.ask.json);
+    command.callback([&status, options] { status = run_track_record(*options); });
+}
+
 void add_ports(CLI::App& app, int& status) {
     CLI::App& command =
         add_command(app, "ports", "the serial ports: path, VID:PID, serial number, description");
@@ -82,6 +97,7 @@ void add_database_commands(CLI::App& app, int& status) {
     add_export(app, status);
     add_verify(app, status);
     add_backup(app, status);
+    add_track_record(app, status);
     add_ports(app, status);
 }
 

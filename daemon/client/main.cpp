@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
     thermbal::add_daemon_commands(app, status);
     thermbal::add_database_commands(app, status);
     thermbal::add_offline_commands(app, status);
+    thermbal::add_model_commands(app, status);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
