@@ -1,0 +1,35 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fit.hpp"
+#include "linearisation.hpp"
+#include "network/effect.hpp"
+
+namespace thermbal {
+
+/// One effect of the catalogue at one place.
+struct Candidate {
+    const EffectDefinition* definition = nullptr;
+    const EffectForm* form = nullptr;
+    std::string at;
+};
+
+/// Every form of every kind at every place of the model where it is not yet. `columns`: those that may be the
+/// room's temperature (measured channels that the model has no sensor for).
+std::vector<Candidate> all_candidates(const Model& model, const std::vector<std::string>& columns);
+
+/// A candidate with the numbers from which a fit may begin, and what the linearised fit gains by it.
+struct Screened {
+    Candidate candidate;
+    Effect start;
+    double log_likelihood_gain = 0.0;
+};
+
+/// Tries the candidate with its shape (onset, period, decay ...) on a grid, its size solved for at each.
+/// `periods_s`: what the residual itself repeats with.
+Screened screen(const Candidate& candidate, const FitProblem& problem, const Fit& fit,
+                const Linearisation& linearisation, const std::vector<double>& periods_s);
+
+}  // namespace thermbal

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "base/error.hpp"
+#include "gap/calibrate.hpp"
+#include "network/parameters.hpp"
+#include "observation.hpp"
+#include "whitening.hpp"
+
+namespace thermbal {
+
+/// What a model is fitted against: the thinned test and how differences count.
+struct FitData {
+    Observation seen;
+    Whitening whitening;
+    /// The first readings carry noise, and every node starts at one. These columns say which readings start a
+    /// node together, and how uncertain their mean is.
+    struct Start {
+        std::vector<std::size_t> first_readings;  ///< indices into Inputs::first_readings
+        double sigma_C;
+    };
+    std::vector<Start> starts;
+};
+
+Result<FitData> make_fit_data(const Model& model, const RecordedTest& test,
+                              const CalibrationOptions& options);
+
+/// Where a fit stands. Coordinates: those of `parameters` (the logarithm where logarithmic), then the offsets
+/// of the starts in C.
+struct FitPoint {
+    Eigen::VectorXd coordinates;
+    Eigen::MatrixXd simulated_C;   ///< bins x observed sensors
+    Eigen::MatrixXd difference_C;  ///< measured - simulated
+    Eigen::VectorXd residual;      ///< whitened differences, then the priors
+    double chi2 = 0.0;
+};
+
+struct Fit {
+    Model model;  ///< at the fitted values; parameters_of(prior model) names its numbers
+    std::vector<Parameter> parameters;  ///< with priors as before the fit
+    FitPoint point;
+    Eigen::MatrixXd jacobian;  ///< of point.residual
+    int iterations = 0;
+    bool converged = false;
+
+    Eigen::MatrixXd hessian() const { return jacobian.transpose() * jacobian; }
+};
+
+using Simulated = Result<Eigen::MatrixXd>;
+
+/// A model with open numbers, against data. Copies nothing of the data: FitData must outlive it.
+class FitProblem {
+  public:
+    /// `prior_model`: values are the priors' centres. REQUIRES: valid.
+    FitProblem(const FitData& data, Model prior_model);
+
+    const std::vector<Parameter>& parameters() const { return parameters_; }
+    const FitData& data() const { return *data_; }
+    Eigen::Index dimensions() const {
+        return static_cast<Eigen::Index>(parameters_.size() + data_->starts.size());
+    }
+    /// The priors' centres, starts at zero.
+    Eigen::VectorXd prior_coordinates() const;
+    Model model_at(const Eigen::VectorXd& coordinates) const;
+    Result<FitPoint> evaluate(const Eigen::VectorXd& coordinates) const;
+    /// Column of the Jacobian of FitPoint::residual by difference quotient.
+    Result<Eigen::VectorXd> sensitivity(const FitPoint& point, Eigen::Index coordinate) const;
+    /// How the readings of a fit change when an effect is added to it, in C (rows x columns of the
+    /// observation), and the same whitened.
+    Simulated reading_change_by(const Fit& fit, const Effect& effect) const;
+    Result<Eigen::VectorXd> change_by(const Fit& fit, const Effect& effect) const;
+    Eigen::VectorXd lower() const;
+    Eigen::VectorXd upper() const;
+
+  private:
+    /// Readings of the observed sensors at the bins; the last coordinates are the starts.
+    Simulated simulated(const Model& model, const Eigen::VectorXd& coordinates) const;
+    double step_of(Eigen::Index coordinate, const FitPoint& point) const;
+
+    const FitData* data_;
+    Model prior_model_;
+    std::vector<Parameter> parameters_;
+};
+
+/// What a fit may start from and how far it goes.
+struct FitStart {
+    Eigen::VectorXd coordinates;
+    /// Sensitivities of the leading coordinates, known from a fit nearby; they are not computed again. Empty:
+    /// all are.
+    const Eigen::MatrixXd* known_jacobian = nullptr;
+};
+
+/// Levenberg-Marquardt within bounds. Errors: those of the simulation at the start.
+Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const CalibrationOptions& options);
+
+}  // namespace thermbal

@@ -1,0 +1,170 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "fit.hpp"
+#include "network/simulate.hpp"
+
+namespace thermbal {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// First readings on the same node belong together.
+std::vector<FitData::Start> starts_of(const Model& model, const Observation& seen) {
+    std::vector<FitData::Start> starts;
+    std::vector<std::string> nodes;
+    for (std::size_t reading = 0; reading < seen.inputs.first_readings.size(); ++reading) {
+        const auto sensor = find_sensor(model, seen.inputs.first_readings[reading].channel);
+        if (!sensor || model.sensors[*sensor].node == ambient_node) continue;
+        const auto column = std::ranges::find(seen.sensors, *sensor) - seen.sensors.begin();
+        if (static_cast<std::size_t>(column) == seen.columns()) continue;
+        const std::string& node = model.sensors[*sensor].node;
+        auto k = static_cast<std::size_t>(std::ranges::find(nodes, node) - nodes.begin());
+        if (k == nodes.size()) {
+            nodes.push_back(node);
+            starts.push_back({{}, 0.0});
+        }
+        const auto so_far = static_cast<double>(starts[k].first_readings.size());
+        const double sum_C = starts[k].sigma_C * so_far;
+        starts[k].first_readings.push_back(reading);
+        starts[k].sigma_C = std::hypot(sum_C, seen.scan_sigma_C(column)) / (so_far + 1.0);
+    }
+    return starts;
+}
+
+double bounded_log(double value) {
+    return value > 0.0 ? std::log(value) : -infinity;
+}
+
+}  // namespace
+
+Result<FitData> make_fit_data(const Model& model, const RecordedTest& test,
+                              const CalibrationOptions& options) {
+    auto seen = observe(model, test, bin_width_s(test, options.bin_s));
+    if (!seen) return std::unexpected(seen.error());
+    FitData data{std::move(*seen), {}, {}};
+    data.whitening = Whitening(data.seen, options.fidelity);
+    data.starts = starts_of(model, data.seen);
+    return data;
+}
+
+FitProblem::FitProblem(const FitData& data, Model prior_model)
+    : data_(&data), prior_model_(std::move(prior_model)), parameters_(parameters_of(prior_model_)) {}
+
+Eigen::VectorXd FitProblem::prior_coordinates() const {
+    Eigen::VectorXd coordinates = Eigen::VectorXd::Zero(dimensions());
+    for (std::size_t i = 0; i < parameters_.size(); ++i) {
+        coordinates(static_cast<Eigen::Index>(i)) = parameters_[i].to_coordinate(parameters_[i].value);
+    }
+    return coordinates;
+}
+
+Model FitProblem::model_at(const Eigen::VectorXd& coordinates) const {
+    Model model = prior_model_;
+    std::vector<double> values(parameters_.size());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+        values[i] = parameters_[i].to_value(coordinates(static_cast<Eigen::Index>(i)));
+    }
+    set_parameter_values(model, values);
+    return model;
+}
+
+Simulated FitProblem::simulated(const Model& model, const Eigen::VectorXd& coordinates) const {
+    Inputs inputs = data_->seen.inputs;
+    const auto starts = static_cast<Eigen::Index>(data_->starts.size());
+    for (Eigen::Index k = 0; k < starts; ++k) {
+        for (const std::size_t reading : data_->starts[static_cast<std::size_t>(k)].first_readings) {
+            inputs.first_readings[reading].value_C += coordinates(coordinates.size() - starts + k);
+        }
+    }
+    auto simulation = simulate(model, inputs, data_->seen.time_s);
+    if (!simulation) return std::unexpected(simulation.error());
+    return Eigen::MatrixXd(simulation->reading_C(Eigen::all, data_->seen.sensors));
+}
+
+Simulated FitProblem::reading_change_by(const Fit& fit, const Effect& effect) const {
+    Model model = fit.model;
+    model.effects.push_back(effect);
+    auto readings_C = simulated(model, fit.point.coordinates);
+    if (readings_C) *readings_C -= fit.point.simulated_C;
+    return readings_C;
+}
+
+Result<Eigen::VectorXd> FitProblem::change_by(const Fit& fit, const Effect& effect) const {
+    const auto change_C = reading_change_by(fit, effect);
+    if (!change_C) return std::unexpected(change_C.error());
+    return data_->whitening(*change_C);
+}
+
+Result<FitPoint> FitProblem::evaluate(const Eigen::VectorXd& coordinates) const {
+    const Observation& seen = data_->seen;
+    const auto count = static_cast<Eigen::Index>(parameters_.size());
+    auto readings_C = simulated(model_at(coordinates), coordinates);
+    if (!readings_C) return std::unexpected(readings_C.error());
+    FitPoint point{coordinates, std::move(*readings_C), {}, {}, 0.0};
+    point.difference_C = seen.reading_C - point.simulated_C;
+    point.residual.resize(seen.reading_C.size() + dimensions());
+    point.residual.head(seen.reading_C.size()) = data_->whitening(point.difference_C);
+    auto priors = point.residual.tail(dimensions());
+    for (Eigen::Index i = 0; i < count; ++i) {
+        const Parameter& parameter = parameters_[static_cast<std::size_t>(i)];
+        priors(i) = parameter.prior_residual(parameter.to_value(coordinates(i)));
+    }
+    for (Eigen::Index i = count; i < dimensions(); ++i) {
+        priors(i) = coordinates(i) / data_->starts[static_cast<std::size_t>(i - count)].sigma_C;
+    }
+    point.chi2 = point.residual.squaredNorm();
+    return point;
+}
+
+Eigen::VectorXd FitProblem::lower() const {
+    Eigen::VectorXd bound = Eigen::VectorXd::Constant(dimensions(), -infinity);
+    for (std::size_t i = 0; i < parameters_.size(); ++i) {
+        const Parameter& p = parameters_[i];
+        bound(static_cast<Eigen::Index>(i)) = p.logarithmic ? bounded_log(p.lower) : p.lower;
+    }
+    return bound;
+}
+
+Eigen::VectorXd FitProblem::upper() const {
+    Eigen::VectorXd bound = Eigen::VectorXd::Constant(dimensions(), infinity);
+    for (std::size_t i = 0; i < parameters_.size(); ++i) {
+        const Parameter& p = parameters_[i];
+        bound(static_cast<Eigen::Index>(i)) = p.to_coordinate(p.upper);
+    }
+    return bound;
+}
+
+/// Small against what the coordinate may do, large against the integrator's own error; across a bin for a
+/// moment of time, because between the samples nothing changes.
+double FitProblem::step_of(Eigen::Index coordinate, const FitPoint& point) const {
+    if (coordinate >= static_cast<Eigen::Index>(parameters_.size())) return 0.1;
+    const Parameter& p = parameters_[static_cast<std::size_t>(coordinate)];
+    if (p.is_time) {
+        const double step_s = 0.5 * data_->seen.bin_s;
+        return p.logarithmic ? step_s / std::max(std::exp(point.coordinates(coordinate)), step_s) : step_s;
+    }
+    if (p.logarithmic) return 0.01;
+    const double spread = std::isinf(p.prior_sigma) ? p.upper - p.lower : p.prior_sigma;
+    return 0.01 * spread;
+}
+
+Result<Eigen::VectorXd> FitProblem::sensitivity(const FitPoint& point, Eigen::Index coordinate) const {
+    double step = step_of(coordinate, point);
+    const bool time = coordinate < static_cast<Eigen::Index>(parameters_.size()) &&
+                      parameters_[static_cast<std::size_t>(coordinate)].is_time;
+    Eigen::VectorXd moved = point.coordinates;
+    moved(coordinate) += step;
+    if (moved(coordinate) > upper()(coordinate)) moved(coordinate) -= 2.0 * step;
+    step = moved(coordinate) - point.coordinates(coordinate);
+    const auto ahead = evaluate(moved);
+    if (!ahead) return std::unexpected(ahead.error());
+    if (!time) return Eigen::VectorXd((ahead->residual - point.residual) / step);
+    moved(coordinate) = point.coordinates(coordinate) - step;
+    const auto behind = evaluate(moved);
+    if (!behind) return std::unexpected(behind.error());
+    return Eigen::VectorXd((ahead->residual - behind->residual) / (2.0 * step));
+}
+
+}  // namespace thermbal

@@ -1,0 +1,51 @@
+#include "whitening.hpp"
+
+#include <cmath>
+
+namespace thermbal {
+
+Whitening::Whitening(const Observation& seen, const ModelFidelity& fidelity)
+    : keep_(seen.reading_C.rows(), seen.reading_C.cols()),
+      gain_(Eigen::MatrixXd::Zero(seen.reading_C.rows(), seen.reading_C.cols())),
+      scale_(Eigen::MatrixXd::Zero(seen.reading_C.rows(), seen.reading_C.cols())) {
+    for (Eigen::Index column = 0; column < keep_.cols(); ++column) {
+        const double wander_C = fidelity.share_of_rise * seen.range_C(column);
+        double variance = wander_C * wander_C;
+        for (Eigen::Index row = 0; row < keep_.rows(); ++row) {
+            const auto k = static_cast<std::size_t>(row);
+            const double step_s = row == 0 ? 0.0 : seen.time_s[k] - seen.time_s[k - 1];
+            const double keep = std::exp(-step_s / fidelity.correlation_s);
+            keep_(row, column) = keep;
+            variance = keep * keep * variance + (1.0 - keep * keep) * wander_C * wander_C;
+            if (!std::isfinite(seen.reading_C(row, column))) continue;
+            const double noise_C = seen.sigma_C(row, column);
+            const double innovation = variance + noise_C * noise_C;
+            gain_(row, column) = variance / innovation;
+            scale_(row, column) = 1.0 / std::sqrt(innovation);
+            variance *= 1.0 - gain_(row, column);
+            log_determinant_ += std::log(innovation);
+            ++readings_;
+        }
+    }
+}
+
+Eigen::VectorXd Whitening::operator()(const Eigen::MatrixXd& difference_C) const {
+    Eigen::VectorXd white(difference_C.size());
+    Eigen::Index out = 0;
+    for (Eigen::Index column = 0; column < difference_C.cols(); ++column) {
+        double wander_C = 0.0;
+        for (Eigen::Index row = 0; row < difference_C.rows(); ++row, ++out) {
+            wander_C *= keep_(row, column);
+            if (scale_(row, column) == 0.0) {
+                white(out) = 0.0;
+                continue;
+            }
+            const double innovation_C = difference_C(row, column) - wander_C;
+            white(out) = innovation_C * scale_(row, column);
+            wander_C += gain_(row, column) * innovation_C;
+        }
+    }
+    return white;
+}
+
+}  // namespace thermbal
