@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <chrono>
+#include <random>
 #include <set>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "backoff.hpp"
 #include "modbus/frame.hpp"
 #include "modbus/profile.hpp"
 #include "wire.hpp"
@@ -35,13 +38,16 @@ bool is_read(const Request& request) {
     return request.function == 3 || request.function == 4;
 }
 
-/// The link's state machine: closed -> open, and on an open RTU line clean -> in doubt -> (drained, probed)
+/// The link's state machine: closed -> (pausing after a failed opening) -> open, and on an open RTU line
+/// clean -> in doubt -> (drained, probed)
 /// -> clean. TCP knows no doubt: the connection is closed, and the transaction id of the next one goes on
 /// counting.
 class ModbusLink final : public Link {
   public:
     explicit ModbusLink(LinkOptions options)
-        : options_(with_line_silence(std::move(options))), wire_(options_) {}
+        : options_(with_line_silence(std::move(options))),
+          wire_(options_),
+          backoff_(options_.first_pause_s, options_.longest_pause_s, std::random_device{}()) {}
 
     Result<Registers> read_block(int unit_id, int function, int first, int count) override {
         if (function != 3 && function != 4) return refuse(fmt::format("function {}; 3 or 4", function));
@@ -112,10 +118,26 @@ class ModbusLink final : public Link {
     Result<void> prepare() {
         if (wire_.is_open() && (!wire_.device_is_same() || spoiled_while_idle())) wire_.close();
         if (wire_.is_open()) return {};
+        return MonotonicClock::now() < pause_until_ ? still_pausing() : open();
+    }
+
+    Result<void> open() {
         auto opened = wire_.open();
-        ++(opened ? counters_.connects : counters_.connect_failures);
         last_byte_ = MonotonicClock::now();
+        if (opened) {
+            ++counters_.connects;
+            backoff_.succeeded();
+            return opened;
+        }
+        ++counters_.connect_failures;
+        pause_until_ = last_byte_ + seconds(backoff_.failed_s());
+        why_pausing_ = opened.error().message;
         return opened;
+    }
+
+    Result<void> still_pausing() {
+        ++counters_.pauses;
+        return fail(NextStep::reopen_link, why_pausing_);
     }
 
     /// A line that the other side has closed since the last reply, or a TCP connection with a reply that
@@ -211,6 +233,9 @@ class ModbusLink final : public Link {
     int last_unit_ = 0;
     Deadline quiet_until_{};  ///< not before this moment is a request sent after a doubt
     Deadline last_byte_{};
+    Backoff backoff_;
+    Deadline pause_until_{};   ///< no opening before this moment, after one that failed
+    std::string why_pausing_;  ///< what that opening said
 };
 
 }  // namespace

@@ -53,6 +53,11 @@ std::string check_link_options(const LinkOptions& options) {
     if (!in_range(options.connect_timeout_s, 0.001, 60.0)) {
         return fmt::format("connect_timeout_s is {}; 0.001 to 60", options.connect_timeout_s);
     }
+    if (!in_range(options.first_pause_s, 0.0, 60.0) ||
+        !in_range(options.longest_pause_s, options.first_pause_s, 60.0)) {
+        return fmt::format("the pause after a failed opening is {} to {} s; 0 to 60, the shorter one first",
+                           options.first_pause_s, options.longest_pause_s);
+    }
     if (!in_range(options.quiet_s, 0.0, 1.0)) return fmt::format("quiet_s is {}; 0 to 1", options.quiet_s);
     return {};
 }

@@ -2,19 +2,25 @@
 
 #include <chrono>
 #include <filesystem>
+#include <set>
 #include <string>
 #include <thread>
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <netinet/in.h>
+#include <signal.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
+#include <sys/prctl.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
 #include <termios.h>
 #include <unistd.h>
 
+#include "backoff.hpp"
 #include "scripted_peer.hpp"
+#include "serial/ports.hpp"
 
 namespace thermbal::test {
 namespace {
@@ -327,6 +333,47 @@ TEST(LinkTcp, RefusedConnectionIsAnErrorAtOnceAndHealsByItself) {
     EXPECT_EQ(link->counters().connect_failures, 1U);
 }
 
+TEST(LinkTcp, AFailedOpeningIsNotTriedAgainAtOnce) {
+    LinkOptions options;
+    {
+        const ScriptedPeer peer(Transport::tcp, [](const Heard&, const Send&, const HangUp&) {});
+        options = peer.options();
+    }
+    options.first_pause_s = 0.05;
+    options.longest_pause_s = 0.2;
+    const auto link = make_link(options);
+    // Sixteen units on a line whose gateway is gone cost one attempt, not sixteen.
+    for (int unit = 1; unit <= 16; ++unit) EXPECT_FALSE(link->read_block(unit, 3, 0, 8));
+    EXPECT_EQ(link->counters().connect_failures, 1U);
+    EXPECT_EQ(link->counters().pauses, 15U);
+    const auto words = link->read_block(1, 3, 0, 8);
+    ASSERT_FALSE(words);
+    EXPECT_THAT(words.error().message, HasSubstr("cannot connect to 127.0.0.1 port"));
+    for (int failure = 2; failure <= 5; ++failure) {
+        wait(205);  // never longer than the longest pause
+        EXPECT_FALSE(link->read_block(1, 3, 0, 8));
+        EXPECT_EQ(link->counters().connect_failures, static_cast<std::uint64_t>(failure));
+    }
+}
+
+TEST(Backoff, DoublesToTheLongestPauseWithJitter) {
+    std::set<double> first;
+    for (std::uint32_t seed = 1; seed <= 20; ++seed) {
+        Backoff backoff(0.1, 2.0, seed);
+        double nominal_s = 0.1;
+        for (int failure = 0; failure < 8; ++failure) {
+            const double pause_s = backoff.failed_s();
+            if (failure == 0) first.insert(pause_s);
+            EXPECT_GE(pause_s, 0.5 * nominal_s);
+            EXPECT_LE(pause_s, nominal_s);
+            nominal_s = std::min(2.0 * nominal_s, 2.0);
+        }
+        backoff.succeeded();
+        EXPECT_LE(backoff.failed_s(), 0.1);
+    }
+    EXPECT_GT(first.size(), 15U) << "every line pauses for the same time";
+}
+
 TEST(LinkTcp, PeerThatNeverAcceptsKeepsTheConnectBound) {
     // A full backlog: the kernel drops further SYNs, as a gateway with one client or a dead address does.
     const int listener = socket(AF_INET, SOCK_STREAM, 0);
@@ -444,6 +491,113 @@ TEST(LinkRtu, AdapterThatComesBackUnderAnotherNameIsFoundWithinOneCall) {
     const auto words = link->read_block(1, 3, 0, 8);
     EXPECT_TRUE(words) << words.error().message;
     EXPECT_EQ(after.requests(), 1);
+}
+
+TEST(LinkRtu, ALinkThatPointsToAnotherPortIsFollowedWithinOneCall) {
+    // What udev does with /dev/serial/by-id when an adapter comes back as ttyUSB1.
+    const auto right = [](const Heard& heard, const Send& send, const HangUp&) { send(heard.right_reply()); };
+    auto before = std::make_unique<ScriptedPeer>(Transport::rtu, right);
+    const ScriptedPeer after(Transport::rtu, right);
+    const std::string by_id = std::filesystem::temp_directory_path() / ("by-id-" + std::to_string(getpid()));
+    std::filesystem::create_symlink(before->device(), by_id);
+    LinkOptions options = before->options();
+    options.device = by_id;
+    options.longest_pause_s = options.first_pause_s = 0.02;
+    const auto link = make_link(options);
+    EXPECT_TRUE(link->read_block(1, 3, 0, 8));
+
+    std::filesystem::remove(by_id);
+    before.reset();
+    const auto gone = link->read_block(1, 3, 0, 8);
+    ASSERT_FALSE(gone);
+    EXPECT_THAT(gone.error().message, HasSubstr(by_id));
+    wait(25);
+    std::filesystem::create_symlink(after.device(), by_id);
+    const auto words = link->read_block(1, 3, 0, 8);
+    EXPECT_TRUE(words) << words.error().message;
+    EXPECT_EQ(after.requests(), 1);
+    std::filesystem::remove(by_id);
+}
+
+TEST(LinkRtu, AnAdapterIsFoundByVidPidAndSerialAmongOthersUnderItsNewName) {
+    const auto right = [](const Heard& heard, const Send& send, const HangUp&) { send(heard.right_reply()); };
+    auto before = std::make_unique<ScriptedPeer>(Transport::rtu, right);
+    const ScriptedPeer after(Transport::rtu, right);
+    std::vector<PortInfo> plugged_in = {{.path = before->device(),
+                                         .by_id_path = "",
+                                         .description = "",
+                                         .usb_vid = 0x0403,
+                                         .usb_pid = 0x6001,
+                                         .serial = "A1"},
+                                        {.path = "/dev/ttyUSB7",
+                                         .by_id_path = "",
+                                         .description = "",
+                                         .usb_vid = 0x0403,
+                                         .usb_pid = 0x6001,
+                                         .serial = "B2"}};
+    PortSelector selector = *parse_vid_pid("0403:6001");
+    selector.serial = "A1";
+    LinkOptions options = before->options();
+    options.device.clear();
+    options.longest_pause_s = options.first_pause_s = 0.02;
+    options.find_device = [&]() -> Result<std::string> {
+        const auto port = match_port(plugged_in, selector);
+        if (!port) return std::unexpected(port.error());
+        return port->path;
+    };
+    const auto link = make_link(options);
+    EXPECT_TRUE(link->read_block(1, 3, 0, 8));
+    plugged_in.erase(plugged_in.begin());
+    before.reset();
+    const auto gone = link->read_block(1, 3, 0, 8);
+    ASSERT_FALSE(gone);
+    EXPECT_THAT(gone.error().message, HasSubstr("no serial port is USB 0403:6001, serial number A1"));
+    wait(25);
+    plugged_in.push_back({.path = after.device(),
+                          .by_id_path = "",
+                          .description = "",
+                          .usb_vid = 0x0403,
+                          .usb_pid = 0x6001,
+                          .serial = "A1"});
+    EXPECT_TRUE(link->read_block(1, 3, 0, 8));
+}
+
+TEST(LinkRtu, AnotherProcessOnThePortIsNamedHoweverItHoldsIt) {
+    ScriptedPeer peer(Transport::rtu,
+                      [](const Heard& heard, const Send& send, const HangUp&) { send(heard.right_reply()); });
+    for (const bool with_lock_file : {false, true}) {
+        int said[2];
+        ASSERT_EQ(pipe(said), 0);
+        const pid_t other = fork();
+        if (other == 0) {
+            prctl(PR_SET_NAME, "minicom-like");
+            const std::string name = "/run/lock/LCK.." + std::string("pts_") +
+                                     std::filesystem::path(peer.device()).filename().string();
+            const int fd = open(peer.device().c_str(), O_RDWR | O_NOCTTY);
+            if (with_lock_file) {
+                const int lock = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL, 0644);
+                dprintf(lock, "%10d\n", getpid());
+            } else {
+                flock(fd, LOCK_EX | LOCK_NB);
+            }
+            if (write(said[1], "x", 1) != 1) _exit(1);
+            pause();
+        }
+        char ready = 0;
+        ASSERT_EQ(read(said[0], &ready, 1), 1);
+        LinkOptions options = peer.options();
+        options.longest_pause_s = options.first_pause_s = 0.0;
+        const auto link = make_link(options);
+        const auto words = link->read_block(1, 3, 0, 8);
+        ASSERT_FALSE(words);
+        EXPECT_THAT(words.error().message,
+                    HasSubstr("is in use by pid " + std::to_string(other) + " (minicom-like)"));
+        kill(other, SIGKILL);
+        waitpid(other, nullptr, 0);
+        EXPECT_TRUE(link->read_block(1, 3, 0, 8)) << "the lock of a process that has died holds nobody up";
+        close(said[0]);
+        close(said[1]);
+    }
 }
 
 TEST(LinkRtu, MissingPortSaysWhatToDo) {

@@ -31,6 +31,11 @@ struct LinkOptions {
         0.5;  ///< from the request to the last byte of the reply: the module's worst reply time
     double connect_timeout_s = 1.0;  ///< name resolution and connection together
     double quiet_s = 0.02;           ///< rtu: silence asked for before a request and after a reply
+
+    /// After an opening that failed, calls fail at once for a while: doubling from the first to the longest
+    /// pause, with jitter. Shorter than the time between two scans, or the first one after a fault is lost.
+    double first_pause_s = 0.1;
+    double longest_pause_s = 2.0;
 };
 
 /// The baud rates that a line may have; any other is refused (libmodbus would silently use 9600).
@@ -53,6 +58,7 @@ struct LinkCounters {
     std::uint64_t stray_bytes = 0;  ///< read away because nobody had asked for them
     std::uint64_t connects = 0;     ///< openings that succeeded
     std::uint64_t connect_failures = 0;
+    std::uint64_t pauses = 0;  ///< calls that failed at once, after an opening that failed
 };
 
 /// A Modbus line to one or more units. Opens itself at the first call and again after a failure. One thread

@@ -1,0 +1,141 @@
+#include "rig.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <limits>
+#include <stdexcept>
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+namespace thermbal::soak {
+namespace {
+
+std::uint64_t mixed(std::uint64_t x) {  // splitmix64
+    x += 0x9E3779B97F4A7C15U;
+    x = (x ^ (x >> 30U)) * 0xBF58476D1CE4E5B9U;
+    x = (x ^ (x >> 27U)) * 0x94D049BB133111EBU;
+    return x ^ (x >> 31U);
+}
+
+std::vector<ModuleUnit> two_units() {
+    return {{.id = 1, .first_channel = 0, .channels = inputs_per_unit},
+            {.id = 2, .first_channel = inputs_per_unit, .channels = inputs_per_unit}};
+}
+
+template <typename T>
+T checked(Result<T> result) {
+    if (!result) throw std::runtime_error(result.error().message);
+    return std::move(*result);
+}
+
+}  // namespace
+
+std::int16_t plant_word(std::uint64_t seed, std::int64_t scan, std::size_t channel) {
+    constexpr std::uint64_t words = 10000;  // -150.0 ... 849.9 C: good for the generic profile
+    const std::uint64_t random = mixed(seed ^ mixed(static_cast<std::uint64_t>(scan) * channels + channel));
+    return static_cast<std::int16_t>(static_cast<int>(random % words) - 1500);
+}
+
+Rig::Rig(Transport transport, std::uint64_t seed)
+    : transport_(transport),
+      seed_(seed),
+      station_(ModbusModule(*find_register_map("int16"), two_units()),
+               {.read_C = [this](double) { return measured_C(); }}, FaultPlan(), SimClock::scaled(1.0, 0),
+               ForeignUnit::silence, {}, seed),
+      turnaround_(seed),
+      server_(
+          std::make_unique<Server>([this](Framing framing, const ModbusRequest& request,
+                                          std::int64_t now_ns) { return answer(framing, request, now_ns); })),
+      stop_(eventfd(0, EFD_CLOEXEC)) {
+    server_->watch_endpoint([this](std::int64_t now_ns) { return look(now_ns); }, 1);
+    if (transport == Transport::tcp) {
+        TcpEndpoint endpoint = checked(listen_on_loopback(0));
+        port_ = endpoint.port;
+        server_->listen(std::move(endpoint));
+    } else {
+        std::string pattern = (std::filesystem::temp_directory_path() / "thermbal-soak-XXXXXX").string();
+        if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no scratch folder");
+        folder_ = pattern;
+        const auto attached = server_->attach([link = folder_ + "/module"] { return open_pty_line(link); });
+        if (!attached) throw std::runtime_error(attached.error().message);
+    }
+    thread_ = std::thread([this] { serve(stop_.get()); });
+}
+
+Rig::~Rig() {
+    eventfd_write(stop_.get(), 1);
+    thread_.join();
+    server_.reset();
+    std::error_code ignored;
+    if (!folder_.empty()) std::filesystem::remove_all(folder_, ignored);
+}
+
+void Rig::serve(int stop_fd) {
+    const auto ended = server_->run(stop_fd);
+    if (!ended) std::fprintf(stderr, "rig: %s\n", ended.error().message.c_str());
+}
+
+LinkOptions Rig::link_options(double response_timeout_s) const {
+    LinkOptions options;
+    options.name = "soak";
+    options.transport = transport_;
+    options.port = port_;
+    options.device = folder_ + "/module";
+    options.baud = 115200;
+    options.response_timeout_s = response_timeout_s;
+    options.connect_timeout_s = response_timeout_s;
+    options.quiet_s = 0.005;
+    options.first_pause_s = 0.005;
+    options.longest_pause_s = 0.01;
+    return options;
+}
+
+void Rig::begin_fault(const Fault& fault) {
+    const std::lock_guard lock(mutex_);
+    ++faults_begun_;
+    disturbed_until_ns_ = std::numeric_limits<std::int64_t>::max();
+    station_.plan().add(fault);
+}
+
+void Rig::end_faults() {
+    const std::lock_guard lock(mutex_);
+    station_.plan().clear();
+}
+
+EndpointState Rig::look(std::int64_t now_ns) {
+    // A request that lay in the kernel while nobody looked is answered at the look after the next one.
+    constexpr std::int64_t soon_ns = 4'000'000;
+    const std::lock_guard lock(mutex_);
+    const EndpointState now = station_.endpoint(now_ns);
+    const bool planned = !station_.plan().faults().empty();
+    if (!planned && seen_ == EndpointState{} &&
+        disturbed_until_ns_ == std::numeric_limits<std::int64_t>::max()) {
+        disturbed_until_ns_ = std::max(effect_until_ns_, now_ns) + soon_ns;
+    }
+    seen_ = now;
+    return now;
+}
+
+std::vector<Delivery> Rig::answer(Framing framing, const ModbusRequest& request, std::int64_t now_ns) {
+    const std::lock_guard lock(mutex_);
+    std::vector<Delivery> sent = station_.serve(framing, request, now_ns);
+    // A real module takes its time; a fault that comes meanwhile finds the exchange half done.
+    const double turnaround_s = std::uniform_real_distribution(0.0, 0.002)(turnaround_);
+    double last_s = 0.0;
+    for (Delivery& delivery : sent) last_s = std::max(last_s, delivery.delay_s += turnaround_s);
+    if (!station_.plan().faults().empty()) {
+        effect_until_ns_ = std::max(effect_until_ns_, now_ns + static_cast<std::int64_t>(last_s * 1e9));
+    }
+    return sent;
+}
+
+std::vector<double> Rig::measured_C() const {
+    std::vector<double> values;
+    for (std::size_t c = 0; c < channels; ++c) values.push_back(plant_word(seed_, scan_, c) / 10.0);
+    return values;
+}
+
+}  // namespace thermbal::soak
