@@ -1,9 +1,11 @@
 #!/usr/bin/env bash
-# Checks beyond the tests: tests/check.sh style|tidy|asan|tsan ...
+# Checks beyond the tests: tests/check.sh style|tidy|asan|tsan|fuzz [SECONDS] ...
 #   style  clang-format on every source
 #   tidy   clang-tidy on every source (about 15 min on 2 cores)
 #   asan   the C++ tests and the programs under AddressSanitizer and UndefinedBehaviorSanitizer
 #   tsan   what has threads under ThreadSanitizer
+#   fuzz   what reads bytes from outside under libFuzzer, AddressSanitizer and UndefinedBehaviorSanitizer, so many seconds
+#          a target (10), two targets at a time
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -16,7 +18,9 @@ build() {  # preset, targets...
     cmake --build --preset "$preset" --target "$@"
 }
 
-for check in "$@"; do
+while [ $# -gt 0 ]; do
+    check=$1
+    shift
     case $check in
         style) sources | xargs clang-format-19 --dry-run --Werror ;;
         tidy)
@@ -34,6 +38,15 @@ for check in "$@"; do
             build tsan acquisition_test compute_test
             for test in acquisition compute; do build/tsan/tests/${test}_test --gtest_brief=1; done
             ;;
-        *) echo "tests/check.sh: unknown check '$check'; there are style, tidy, asan, tsan" >&2; exit 2 ;;
+        fuzz)
+            seconds=10
+            if [[ ${1:-} =~ ^[0-9]+$ ]]; then
+                seconds=$1
+                shift
+            fi
+            build fuzz fuzzers
+            tests/fuzz/run.sh "$seconds"
+            ;;
+        *) echo "tests/check.sh: unknown check '$check'; there are style, tidy, asan, tsan, fuzz" >&2; exit 2 ;;
     esac
 done

@@ -33,7 +33,8 @@ class CsvReader {
         take_line_end();
     }
 
-    /// The cells of the next record; empty cells for an empty line; nullopt for an unclosed quote.
+    /// The cells of the next record; empty cells for an empty line; nullopt for an unclosed quote, or text
+    /// behind a closed one.
     std::optional<std::vector<Cell>> next() {
         std::vector<Cell> cells;
         for (;;) {
@@ -62,7 +63,7 @@ class CsvReader {
             if (text_[at_] == '"') {
                 if (at_ + 1 >= text_.size() || text_[at_ + 1] != '"') {
                     ++at_;
-                    return true;
+                    return at_end() || text_[at_] == ',' || text_[at_] == '\r' || text_[at_] == '\n';
                 }
                 ++at_;
             }
@@ -101,6 +102,16 @@ std::optional<double> parse_cell(std::string_view text) {
     return value;
 }
 
+constexpr std::string_view bad_quotes = "a quoted cell is not closed, or text follows its closing quote";
+
+/// As a cell of RFC 4180.
+std::string quoted_where_needed(const std::string& text) {
+    if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+    std::string cell = "\"";
+    for (const char c : text) cell += c == '"' ? std::string("\"\"") : std::string(1, c);
+    return cell + '"';
+}
+
 std::unexpected<Error> refuse(std::string_view name, std::size_t line, std::size_t column,
                               std::string_view what) {
     return fail(NextStep::refuse_input, fmt::format("{}:{}:{}: {}", name, line, column, what));
@@ -113,7 +124,7 @@ Result<RecordedTest> parse_recorded_test(std::string_view csv_text, std::string_
     while (reader.at_comment()) reader.skip_line();
     if (reader.at_end()) return refuse(name, reader.line(), 1, "no header found; expected time_s,T1,...");
     const auto header = reader.next();
-    if (!header) return refuse(name, reader.line(), 1, "a quoted cell is not closed");
+    if (!header) return refuse(name, reader.line(), 1, bad_quotes);
     if (header->front().text != "time_s") {
         return refuse(name, header->front().line, 1,
                       fmt::format("first column is '{}', expected time_s", header->front().text));
@@ -136,7 +147,7 @@ Result<RecordedTest> parse_recorded_test(std::string_view csv_text, std::string_
 
     while (!reader.at_end()) {
         const auto record = reader.next();
-        if (!record) return refuse(name, reader.line(), 1, "a quoted cell is not closed");
+        if (!record) return refuse(name, reader.line(), 1, bad_quotes);
         const Cell& first = record->front();
         if (record->size() == 1 && first.text.empty()) continue;  // an empty line
         if (record->size() != header->size()) {
@@ -171,8 +182,8 @@ Result<RecordedTest> parse_recorded_test(std::string_view csv_text, std::string_
 
 std::string format_recorded_test(const RecordedTest& test) {
     std::string text = "time_s";
-    for (const Column& column : test.channels) text += "," + column.name;
-    for (const Column& column : test.inputs) text += "," + column.name;
+    for (const Column& column : test.channels) text += "," + quoted_where_needed(column.name);
+    for (const Column& column : test.inputs) text += "," + quoted_where_needed(column.name);
     text += "\r\n";
     const auto add = [&](const Column& column, std::size_t row) {
         text += ',';

@@ -36,6 +36,15 @@ TEST(Csv, WhatIsWrittenReadsBackToTheSameDoubles) {
     EXPECT_EQ(again->inputs[0].values, test.inputs[0].values);
 }
 
+TEST(Csv, AnInputMayHaveAnyName) {
+    const RecordedTest test{{0.0}, {{"T1", {1.0}}}, {{"load, \"of\"\r\nthe spindle", {2.0}}}};
+    const auto again = parse_recorded_test(format_recorded_test(test), "again");
+    ASSERT_TRUE(again) << again.error().message;
+    ASSERT_EQ(again->inputs.size(), 1U);
+    EXPECT_EQ(again->inputs[0].name, test.inputs[0].name);
+    EXPECT_EQ(again->inputs[0].values, test.inputs[0].values);
+}
+
 struct Refused {
     const char* text;
     const char* message;
@@ -50,18 +59,18 @@ TEST_P(CsvRefused, SaysFileLineColumnAndWhatWasFound) {
     EXPECT_THAT(test.error().message, HasSubstr(GetParam().message));
 }
 
-INSTANTIATE_TEST_SUITE_P(Csv, CsvRefused,
-                         testing::Values(Refused{"", "bad.csv:1:1: no header"},
-                                         Refused{"t,T1\n0,1\n", "first column is 't'"},
-                                         Refused{"time_s,T1\n", "no row follows"},
-                                         Refused{"time_s,T1,T1\n0,1,2\n", "'T1' stands twice"},
-                                         Refused{"time_s,T1\n0,1\n0,2\n", "bad.csv:3:1: time_s is 0 after 0"},
-                                         Refused{"time_s,T1\n0,1\n15,abc\n", "bad.csv:3:4: T1 is 'abc'"},
-                                         Refused{"time_s,T1\n0,1,2\n", "3 cells, the header has 2"},
-                                         Refused{"time_s,T1\n0,inf\n", "T1 is 'inf'"},
-                                         Refused{"time_s,T1\n\"0,1\n", "not closed"},
-                                         Refused{"time_s,\n0,1\n", "a column has no name"},
-                                         Refused{"time_s,T1\n,1\n", "time_s is ''"}));
+INSTANTIATE_TEST_SUITE_P(
+    Csv, CsvRefused,
+    testing::Values(Refused{"", "bad.csv:1:1: no header"}, Refused{"t,T1\n0,1\n", "first column is 't'"},
+                    Refused{"time_s,T1\n", "no row follows"},
+                    Refused{"time_s,T1,T1\n0,1,2\n", "'T1' stands twice"},
+                    Refused{"time_s,T1\n0,1\n0,2\n", "bad.csv:3:1: time_s is 0 after 0"},
+                    Refused{"time_s,T1\n0,1\n15,abc\n", "bad.csv:3:4: T1 is 'abc'"},
+                    Refused{"time_s,T1\n0,1,2\n", "3 cells, the header has 2"},
+                    Refused{"time_s,T1\n0,inf\n", "T1 is 'inf'"}, Refused{"time_s,T1\n\"0,1\n", "not closed"},
+                    Refused{"time_s,\"T1\"x,T2\n0,1,2\n", "text follows its closing quote"},
+                    Refused{"time_s,\n0,1\n", "a column has no name"},
+                    Refused{"time_s,T1\n,1\n", "time_s is ''"}));
 
 }  // namespace
 }  // namespace thermbal
