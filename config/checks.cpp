@@ -43,6 +43,9 @@ void check_names(const Config& config, const ConfigTables& tables, Complaints& c
     each_double(
         config.channels, [](const ChannelConfig& channel) { return channel.name; },
         [&](std::size_t i, std::size_t) { twice(tables.channels, "channel", config.channels[i].name, i); });
+    each_double(
+        config.alarms, [](const AlarmConfig& alarm) { return alarm.name; },
+        [&](std::size_t i, std::size_t) { twice(tables.alarms, "alarm", config.alarms[i].name, i); });
 }
 
 void check_addresses(const Config& config, const ConfigTables& tables, Complaints& complaints) {

@@ -13,6 +13,7 @@ struct ConfigTables {
     std::vector<const toml::table*> lines;
     std::vector<const toml::table*> units;
     std::vector<const toml::table*> channels;
+    std::vector<const toml::table*> alarms;
 };
 
 /// What no single key can tell: names and addresses given twice, roles, and whether the calls of a line fit

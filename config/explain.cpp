@@ -62,18 +62,37 @@ std::string as_comment(const std::string& text) {
 }
 
 std::string explain_unit(const Config& config, const UnitConfig& unit) {
-    return fmt::format("\n[[unit]]\nname = {}\nline = {}\nunit_id = {}\nprofile = {}\n{}", quoted(unit.name),
-                       quoted(config.lines[unit.line].link.name), unit.unit_id, quoted(unit.profile_name),
-                       as_comment(explain_profile(unit.profile)));
+    return fmt::format(
+        "\n[[unit]]\nname = {}\nline = {}\nunit_id = {}\nprofile = {}\nfrozen_after_min = {}\n{}",
+        quoted(unit.name), quoted(config.lines[unit.line].link.name), unit.unit_id, quoted(unit.profile_name),
+        unit.frozen_after_min, as_comment(explain_profile(unit.profile)));
+}
+
+std::string explain_calibration(const Calibration& calibration) {
+    if (!calibration.certificate) return fmt::format("offset_C = {}\n", calibration.offset_C);
+    const PlatinumCoefficients& sensor = *calibration.certificate;
+    return fmt::format("certificate = {{ number = {}, R0_ohm = {}, A = {}, B = {}, C = {} }}\n",
+                       quoted(calibration.certificate_number), sensor.R0_ohm, sensor.A, sensor.B, sensor.C);
 }
 
 std::string explain_channel(const Config& config, const ChannelConfig& channel) {
     return fmt::format(
-        "\n[[channel]]\nname = {}\nunit = {}\ninput = {}\nrole = \"{}\"\nplace = {}\nrequired = {}\noffset_C "
-        "= {}\n",
+        "\n[[channel]]\nname = {}\nunit = {}\ninput = {}\nrole = \"{}\"\nplace = {}\nrequired = {}\n{}",
         quoted(channel.name), quoted(config.units[channel.unit].name), channel.input,
         channel.role == ChannelConfig::Role::ambient ? "ambient" : "structure", quoted(channel.place),
-        channel.required, channel.offset_C);
+        channel.required, explain_calibration(channel.calibration));
+}
+
+std::string explain_alarm(const Config& config, const AlarmConfig& alarm) {
+    std::string text = fmt::format("\n[[alarm]]\nname = {}\n", quoted(alarm.name));
+    if (alarm.channel) text += fmt::format("channel = {}\n", quoted(config.channels[*alarm.channel].name));
+    if (alarm.above_C) text += fmt::format("above_C = {}\n", *alarm.above_C);
+    if (alarm.below_C) text += fmt::format("below_C = {}\n", *alarm.below_C);
+    if (alarm.rate_C_per_min) {
+        text += fmt::format("rate_C_per_min = {}\nrate_over_min = {}\n", *alarm.rate_C_per_min,
+                            alarm.rate_over_min);
+    }
+    return text + fmt::format("scans = {}\n", alarm.scans);
 }
 
 std::string explain_stop(const Config& config) {
@@ -117,6 +136,7 @@ std::string explain_config(const Config& config) {
     for (const LineConfig& line : config.lines) text += explain_line(line);
     for (const UnitConfig& unit : config.units) text += explain_unit(config, unit);
     for (const ChannelConfig& channel : config.channels) text += explain_channel(config, channel);
+    for (const AlarmConfig& alarm : config.alarms) text += explain_alarm(config, alarm);
     return text;
 }
 

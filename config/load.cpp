@@ -41,6 +41,7 @@ class Loader {
         for (const toml::table* table : reader.tables("line")) read_line(*table);
         for (const toml::table* table : reader.tables("unit")) read_unit(*table);
         for (const toml::table* table : reader.tables("channel")) read_channel(*table);
+        for (const toml::table* table : reader.tables("alarm")) read_alarm(*table);
         section(reader, "identification", &Loader::read_identification);
         section(reader, "stop", &Loader::read_stop);
         reader.finish();
@@ -219,6 +220,7 @@ class Loader {
             else
                 reader.complain("profile", profile.error().message);
         }
+        set(unit.frozen_after_min, reader.number("frozen_after_min", {1.0, 1440.0}));
         reader.finish();
         units_.emplace(unit.name, config_.units.size());
         config_.units.push_back(std::move(unit));
@@ -248,10 +250,58 @@ class Loader {
                             "found true; accepted: false: the ambient does not settle, it is the reference");
         }
         set(channel.place, reader.text("place"));
-        set(channel.offset_C, reader.number("offset_C", {-20.0, 20.0}));
+        set(channel.calibration.offset_C, reader.number("offset_C", {-20.0, 20.0}));
+        if (const toml::table* certificate = reader.table("certificate")) {
+            if (reader.has("offset_C")) {
+                reader.complain("certificate", "accepted: either offset_C or certificate, not both");
+            }
+            read_certificate(*certificate, channel.calibration);
+        }
         reader.finish();
+        channels_.emplace(channel.name, config_.channels.size());
         config_.channels.push_back(std::move(channel));
         tables_.channels.push_back(&table);
+    }
+
+    void read_certificate(const toml::table& table, Calibration& calibration) {
+        TableReader reader(table, "channel.certificate", complaints_);
+        PlatinumCoefficients sensor;
+        reader.require("R0_ohm", "the resistance at 0 C, as the certificate says it");
+        set(calibration.certificate_number, reader.text("number"));
+        set(sensor.R0_ohm, reader.number("R0_ohm", {1.0, 10'000.0}));
+        set(sensor.A, reader.number("A", {-1.0, 1.0}));
+        set(sensor.B, reader.number("B", {-1.0, 1.0}));
+        set(sensor.C, reader.number("C", {-1.0, 1.0}));
+        if (const std::string complaint = check_coefficients(sensor); !complaint.empty()) {
+            reader.complain("", complaint);
+        }
+        reader.finish();
+        calibration.certificate = sensor;
+    }
+
+    void read_alarm(const toml::table& table) {
+        TableReader reader(table, "alarm", complaints_);
+        AlarmConfig alarm;
+        alarm.name = read_name(reader, fmt::format("alarm {}", config_.alarms.size() + 1));
+        if (reader.has("channel")) alarm.channel = reference(reader, "channel", channels_);
+        alarm.above_C = reader.number("above_C", {-200.0, 850.0});
+        alarm.below_C = reader.number("below_C", {-200.0, 850.0});
+        alarm.rate_C_per_min = reader.number("rate_C_per_min", {0.001, 1000.0});
+        set(alarm.rate_over_min, reader.number("rate_over_min", {0.1, 60.0}));
+        set(alarm.scans, reader.integer("scans", {1, 100}));
+        reader.finish();
+        if (!reader.has("above_C") && !reader.has("below_C") && !reader.has("rate_C_per_min")) {
+            reader.complain("above_C",
+                            "is missing; accepted: above_C, below_C or rate_C_per_min, or several");
+        }
+        if (alarm.above_C && alarm.below_C && *alarm.above_C <= *alarm.below_C) {
+            reader.complain("above_C",
+                            fmt::format("found {}, which is not above below_C = {}: every reading would "
+                                        "be an alarm",
+                                        *alarm.above_C, *alarm.below_C));
+        }
+        config_.alarms.push_back(std::move(alarm));
+        tables_.alarms.push_back(&table);
     }
 
     static bool is_channel_name(std::string_view name) {
@@ -301,6 +351,7 @@ class Loader {
     ConfigTables tables_;
     Index lines_;
     Index units_;
+    Index channels_;
 };
 
 }  // namespace

@@ -71,7 +71,8 @@ std::optional<toml::table> parse_toml(std::string_view text, Complaints& complai
 }
 
 std::string TableReader::name(std::string_view key) const {
-    return path_.empty() ? std::string(key) : fmt::format("{}.{}", path_, key);
+    if (path_.empty() || key.empty()) return path_ + std::string(key);
+    return fmt::format("{}.{}", path_, key);
 }
 
 const toml::node* TableReader::take(std::string_view key) {

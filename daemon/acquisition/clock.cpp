@@ -63,6 +63,16 @@ class SystemClock final : public SleepingClock {
   public:
     std::int64_t monotonic_ns() const override { return read_ns(CLOCK_BOOTTIME); }
     std::int64_t wall_ns() const override { return read_ns(CLOCK_REALTIME); }
+    ClockReading read() const override {
+        // Somebody may take the processor away between two of them: that is no suspend.
+        constexpr std::int64_t together_ns = 5'000'000;
+        ClockReading reading;
+        for (int attempt = 0; attempt < 5; ++attempt) {
+            reading = {read_ns(CLOCK_BOOTTIME), read_ns(CLOCK_MONOTONIC), read_ns(CLOCK_REALTIME)};
+            if (read_ns(CLOCK_BOOTTIME) - reading.boot_ns < together_ns) break;
+        }
+        return reading;
+    }
     std::int64_t real_ns_until(std::int64_t deadline_ns) const override {
         return deadline_ns - monotonic_ns();
     }

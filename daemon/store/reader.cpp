@@ -44,9 +44,12 @@ StoredTest test_in(const sqlite::Statement& row) {
 Result<std::vector<ChannelRecord>> channels_of(sqlite::Database& database, TestId id) {
     std::vector<ChannelRecord> channels;
     auto rows = database.query(
-        "SELECT name, role, place, required, source FROM channels WHERE test_id = ? ORDER BY position", id);
+        "SELECT name, role, place, required, source, calibration FROM channels WHERE test_id = ? ORDER BY "
+        "position",
+        id);
     while (rows.next())
-        channels.push_back({rows.text(0), rows.text(1), rows.text(2), rows.integer(3) != 0, rows.text(4)});
+        channels.push_back(
+            {rows.text(0), rows.text(1), rows.text(2), rows.integer(3) != 0, rows.text(4), rows.text(5)});
     if (auto status = rows.status(); !status) return std::unexpected(status.error());
     return channels;
 }
@@ -97,6 +100,7 @@ Sample sample_in(const sqlite::Statement& row, int first_column) {
     if (!row.null(first_column)) sample.raw = static_cast<std::uint32_t>(row.integer(first_column));
     sample.value_C = row.real(first_column + 1);
     sample.quality = quality_from_string(row.text(first_column + 2)).value_or(Quality::gap);
+    sample.source_C = row.real(first_column + 3);
     return sample;
 }
 
@@ -225,7 +229,7 @@ Result<std::vector<ScanRecord>> Reader::scans(TestId id, std::int64_t from_scan,
         "WHERE test_id = ? AND scan BETWEEN ? AND ? ORDER BY scan",
         id, from_scan, to_scan);
     RowsByScan samples(
-        database_->query("SELECT scan, raw, value_C, quality FROM samples "
+        database_->query("SELECT scan, raw, value_C, quality, source_C FROM samples "
                          "WHERE test_id = ? AND scan BETWEEN ? AND ? ORDER BY scan, channel",
                          id, from_scan, to_scan));
     RowsByScan inputs(

@@ -166,7 +166,18 @@ ALTER TABLE declarations_3 RENAME TO declarations;
 CREATE UNIQUE INDEX one_standing_declaration ON declarations (test_id, channel) WHERE withdrawn = '';
 )sql";
 
-constexpr std::array steps = {version_1, version_2, version_3};
+// What the module said stands beside what a calibration made of it, and what the calibration was.
+constexpr const char* version_4 = R"sql(
+ALTER TABLE samples ADD COLUMN source_C REAL CHECK (abs(source_C) < 1e300);
+ALTER TABLE channels ADD COLUMN calibration TEXT NOT NULL DEFAULT '';
+DROP VIEW readings;
+CREATE VIEW readings AS
+  SELECT s.test_id, s.scan, g.time_s, g.wall_ns, c.name AS channel, s.raw, s.source_C, s.value_C, s.quality
+  FROM samples s JOIN scans g USING (test_id, scan)
+  JOIN channels c ON c.test_id = s.test_id AND c.position = s.channel;
+)sql";
+
+constexpr std::array steps = {version_1, version_2, version_3, version_4};
 
 }  // namespace
 

@@ -96,6 +96,7 @@ class Database {
 
     void set_busy_timeout_ms(int milliseconds);
     std::int64_t last_insert_id() const;
+    std::int64_t changes() const;  ///< rows that the last statement changed
     bool in_transaction() const;
 
     /// A connection that only looked must not fold the WAL into the file as it closes.

@@ -30,7 +30,8 @@ constexpr std::string_view insert_scan_sql =
     "INSERT INTO scans (test_id, scan, status, time_s, scheduled_ns, started_ns, finished_ns, wall_ns) "
     "VALUES (?, ?, ?, ?, ?, ?, ?, ?)";
 constexpr std::string_view insert_sample_sql =
-    "INSERT INTO samples (test_id, scan, channel, raw, value_C, quality) VALUES (?, ?, ?, ?, ?, ?)";
+    "INSERT INTO samples (test_id, scan, channel, raw, value_C, quality, source_C) VALUES (?, ?, ?, ?, ?, ?, "
+    "?)";
 constexpr std::string_view insert_input_sql =
     "INSERT INTO inputs (test_id, scan, name, value) VALUES (?, ?, ?, ?)";
 
@@ -110,11 +111,6 @@ Result<void> check_scan(const ScanContext& context, const ScanRecord& scan) {
     const auto refuse = [&](const std::string& what) {
         return fail(NextStep::refuse_input, fmt::format("test {}, scan {}: {}", context.id, scan.scan, what));
     };
-    if (scan.scan <= context.last_scan)
-        return refuse(fmt::format("scan {} is stored already; scans rise", context.last_scan));
-    if (!(scan.time_s > context.last_time_s))
-        return refuse(
-            fmt::format("time_s {} is not after {} of the scan before", scan.time_s, context.last_time_s));
     const bool all_gaps = scan.status == ScanStatus::missed && scan.samples.empty();
     if (!all_gaps && scan.samples.size() != context.channels)
         return refuse(fmt::format("{} samples for {} channels", scan.samples.size(), context.channels));
@@ -124,6 +120,31 @@ Result<void> check_scan(const ScanContext& context, const ScanRecord& scan) {
             return refuse("a missed scan with a reading");
     }
     return {};
+}
+
+/// A scan comes behind the last one, or fills a hole that an earlier refusal left.
+Result<void> check_place(sqlite::Database& database, const ScanContext& context, const ScanRecord& scan) {
+    const auto refuse = [&](const std::string& what) {
+        return fail(NextStep::refuse_input, fmt::format("test {}, scan {}: {}", context.id, scan.scan, what));
+    };
+    const auto not_after = [&](double before_s) {
+        return refuse(fmt::format("time_s {} is not after {} of the scan before", scan.time_s, before_s));
+    };
+    if (scan.scan > context.last_scan)
+        return scan.time_s > context.last_time_s ? Result<void>() : not_after(context.last_time_s);
+    auto around = database.query(
+        "SELECT (SELECT count(*) FROM scans WHERE test_id = ?1 AND scan = ?2), "
+        "(SELECT time_s FROM scans WHERE test_id = ?1 AND scan < ?2 ORDER BY scan DESC LIMIT 1), "
+        "(SELECT time_s FROM scans WHERE test_id = ?1 AND scan > ?2 ORDER BY scan LIMIT 1)",
+        context.id, scan.scan);
+    if (around.next()) {
+        if (around.integer(0) != 0) return refuse("is stored already, with another content");
+        if (!around.null(1) && !(scan.time_s > around.real(1))) return not_after(around.real(1));
+        if (!around.null(2) && !(scan.time_s < around.real(2)))
+            return refuse(
+                fmt::format("time_s {} is not before {} of the scan after", scan.time_s, around.real(2)));
+    }
+    return around.status();
 }
 
 Result<bool> is_stored(sqlite::Database& database, TestId id, const ScanRecord& scan) {
@@ -150,7 +171,7 @@ Result<void> insert_scan(sqlite::Database& database, const ScanContext& context,
         const double value_C = sample.good() ? sample.value_C : no_value;
         if (auto done = insert_sample
                             .bind(context.id, scan.scan, static_cast<std::int64_t>(channel), raw, value_C,
-                                  to_string(sample.quality))
+                                  to_string(sample.quality), sample.source_C)
                             .run();
             !done)
             return done;
@@ -259,13 +280,14 @@ Result<TestId> Store::begin_test(const TestRecord& test) {
             return inserted;
         id = database.last_insert_id();
         auto insert = database.query(
-            "INSERT INTO channels (test_id, position, name, role, place, required, source) VALUES (?, ?, ?, "
-            "?, ?, ?, ?)");
+            "INSERT INTO channels (test_id, position, name, role, place, required, source, calibration) "
+            "VALUES "
+            "(?, ?, ?, ?, ?, ?, ?, ?)");
         std::int64_t position = 0;
         for (const auto& channel : test.channels)
             if (auto inserted = insert
                                     .bind(id, position++, channel.name, channel.role, channel.place,
-                                          channel.required, channel.source)
+                                          channel.required, channel.source, channel.calibration)
                                     .run();
                 !inserted)
                 return inserted;
@@ -291,12 +313,35 @@ Result<void> Store::append_scans(TestId id, std::span<const ScanRecord> scans) {
                 if (*stored) continue;
             }
             if (auto sound = check_scan(*context, scan); !sound) return sound;
+            if (auto fits = check_place(database, *context, scan); !fits) return fits;
             if (auto inserted = insert_scan(database, *context, scan); !inserted) return inserted;
+            if (scan.scan < context->last_scan) continue;
             context->last_scan = scan.scan;
             context->last_time_s = scan.time_s;
         }
         return {};
     });
+}
+
+Result<std::int64_t> Store::mark_stuck(TestId id, std::span<const std::size_t> channels,
+                                       std::int64_t first_scan, std::int64_t last_scan) {
+    auto& database = parts_->database();
+    std::int64_t marked = 0;
+    auto done = in_transaction(database, [&]() -> Result<void> {
+        auto update = database.query(
+            "UPDATE samples SET quality = 'stuck', value_C = NULL, source_C = NULL WHERE test_id = ? AND "
+            "channel = ? "
+            "AND scan BETWEEN ? AND ? AND quality = 'good'");
+        for (const std::size_t channel : channels) {
+            if (auto run = update.bind(id, static_cast<std::int64_t>(channel), first_scan, last_scan).run();
+                !run)
+                return run;
+            marked += database.changes();
+        }
+        return {};
+    });
+    if (!done) return std::unexpected(done.error());
+    return marked;
 }
 
 Result<void> Store::record_declaration(TestId id, const DeclarationRecord& declaration) {

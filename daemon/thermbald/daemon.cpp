@@ -16,23 +16,28 @@ namespace thermbal {
 //   module -> scan -> store -> window -> (filter -> SVR sweep -> criterion, shared time constants ->
 //   interval: core's LiveFlow, on the identifier's thread) -> declaration -> stop rule -> stop
 
-void Daemon::take_scan(const Scan& scan) {
+void Daemon::take_scan(Scan& scan) {
+    watch_modules(scan);
+    watch_time(scan);
     latest_ = scan;
     bool identifying = false;
     if (is_measuring(test_.state)) {
         store_scan(scan);
         grow_window(scan);
-        if (identification_is_due(scan.scan)) {
+        raise_alarm(scan);
+        if (is_measuring(test_.state) && identification_is_due(scan.scan)) {
             identifying = true;
             test_.submitted_scan = scan.scan;
             identifier_->submit(
                 {generation_, scan.scan, test_.window, test_.declarations.declared_channels(), test_.flow});
         }
-        if (over_time(scan)) {
+        if (is_measuring(test_.state) && over_time(scan)) {
             end_test(TestEvent::abort, fmt::format("longer than test.max_duration_min = {}",
                                                    *options_.config.test.max_duration_min));
         }
     }
+    storage_.flush();
+    tell_storage_news();
     if (server_.counters().subscribers > 0) server_.publish("scan", channels_json().value_or(nullptr));
     if (!is_measuring(test_.state) || !identifying) settle(scan.scan);
 }
@@ -72,10 +77,9 @@ void Daemon::decide() {
     if (!test_.decision.stop || test_.state != TestState::running) return;
 
     test_.state = TestState::declared;
-    if (const auto stored = store_.set_state(test_.id, TestState::declared, now(), test_.decision.reason);
-        !stored) {
-        spdlog::error("{}", stored.error().message);
-    }
+    write([id = test_.id, at = now(), reason = test_.decision.reason](Store& store) {
+        return store.set_state(id, TestState::declared, at, reason);
+    });
     event("all_declared", test_.decision.reason);
     act_on_declaration();
 }
@@ -87,7 +91,7 @@ void Daemon::act_on_declaration() {
         // The machine first: should the daemon die between the two, the next one finds the test declared and
         // stops the machine again, rather than finding it stopped and never asking.
         test_.end_reason = test_.decision.reason;
-        carry_out_stop();
+        carry_out_stop(TestState::declared);
         end_test(TestEvent::stop, test_.decision.reason);
     }
 }
@@ -98,9 +102,9 @@ void Daemon::end_test(TestEvent how, const std::string& reason) {
     identifier_->cancel();
     test_.state = *state;
     test_.end_reason = reason;
-    if (const auto stored = store_.set_state(test_.id, *state, now(), reason); !stored) {
-        spdlog::error("the end of test {} is not stored yet: {}", test_.id, stored.error().message);
-    }
+    write([id = test_.id, ended = *state, at = now(), reason](Store& store) {
+        return store.set_state(id, ended, at, reason);
+    });
     archive_test();
     event(to_string(*state), reason);
     settle(test_.last_scan);
@@ -138,15 +142,14 @@ void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::
         records.push_back(
             {verdict.channel, window_end_scan, clock_.wall_ns(), verdict_to_json(verdict).dump()});
     }
-    if (const auto stored = store_.record_identifications(test_.id, records); !stored) {
-        spdlog::warn("an identification is not stored: {}", stored.error().message);
-    }
+    write([id = test_.id,
+           records = std::move(records)](Store& store) { return store.record_identifications(id, records); },
+          "identifications");
     for (const DeclarationChange& change : changes) {
         if (change.kind == DeclarationChange::Kind::withdrawn) {
-            if (const auto stored = store_.withdraw_declaration(test_.id, change.channel, change.reason);
-                !stored) {
-                spdlog::error("{}", stored.error().message);
-            }
+            write([id = test_.id, change](Store& store) {
+                return store.withdraw_declaration(id, change.channel, change.reason);
+            });
             event("withdrawn",
                   fmt::format("{}: the declaration is withdrawn: {}", change.channel, change.reason),
                   change.channel);
@@ -167,9 +170,9 @@ void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::
                                  .basis_json = verdict_to_json(verdict).dump(),
                                  .version = options_.version,
                                  .withdrawn = {}};
-        if (const auto stored = store_.record_declaration(test_.id, record); !stored) {
-            spdlog::error("the declaration of {} is not stored: {}", verdict.channel, stored.error().message);
-        }
+        write([id = test_.id, record = std::move(record)](Store& store) {
+            return store.record_declaration(id, record);
+        });
         event("declared",
               fmt::format("{} settles at {:.2f} C ({:.2f} to {:.2f} C), 95 % of the rise at {:.0f} min",
                           verdict.channel, verdict.steady_state_C, verdict.steady_state_low_C,
@@ -177,6 +180,17 @@ void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::
               verdict.channel);
         server_.publish("declaration", verdict_to_json(verdict));
     }
+}
+
+/// A test without a person beside it must not do damage: the machine is stopped as at the end of any test.
+void Daemon::raise_alarm(const Scan& scan) {
+    const auto alarm = alarm_watch_->take(test_.grid.time_s(scan.scan), scan.samples);
+    if (!alarm) return;
+    const std::string& channel = options_.config.channels[alarm->channel].name;
+    test_.end_reason = fmt::format("alarm: {} {}", channel, alarm->reason);
+    event("alarm", test_.end_reason, channel);
+    carry_out_stop(TestState::aborted);
+    end_test(TestEvent::abort, test_.end_reason);
 }
 
 bool Daemon::over_time(const Scan& scan) const {

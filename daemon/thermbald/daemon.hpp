@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,10 +8,13 @@
 
 #include <systemd/sd-event.h>
 
+#include "acquisition/alarm_watch.hpp"
 #include "acquisition/clock.hpp"
+#include "acquisition/freeze_watch.hpp"
 #include "acquisition/line_reader.hpp"
 #include "acquisition/mailbox.hpp"
 #include "acquisition/scan.hpp"
+#include "acquisition/time_watch.hpp"
 #include "compute/identifier.hpp"
 #include "config/config.hpp"
 #include "declaration/declarations.hpp"
@@ -22,7 +24,7 @@
 #include "service/hooks.hpp"
 #include "service/socket_server.hpp"
 #include "statistics.hpp"
-#include "store/store.hpp"
+#include "store/store_queue.hpp"
 
 namespace thermbal {
 
@@ -77,7 +79,7 @@ class Daemon {
     Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer server, HookRunner hooks);
 
     // The live flow (daemon.cpp).
-    void take_scan(const Scan& scan);
+    void take_scan(Scan& scan);
     void take_identification(IdentificationResult result);
     void grow_window(const Scan& scan);
     bool identification_is_due(std::int64_t scan) const;
@@ -86,6 +88,12 @@ class Daemon {
     void act_on_declaration();
     void end_test(TestEvent how, const std::string& reason);
     bool over_time(const Scan& scan) const;
+    void raise_alarm(const Scan& scan);
+
+    // What a scan says about the modules and the host (watches.cpp).
+    void watch_modules(Scan& scan);
+    void watch_time(const Scan& scan);
+    void take_back(const WatchedModule& module, std::int64_t first_scan, std::int64_t last_scan);
 
     // Starting and resuming (tests.cpp).
     Result<TestId> start_test(const std::string& name, const std::string& machine);
@@ -96,12 +104,15 @@ class Daemon {
     void archive_test();
 
     // The stop action (stop_action.cpp).
-    void carry_out_stop();
+    /// `state` is what the test is when the machine has been stopped.
+    void carry_out_stop(TestState state);
     void write_stop_register();
     void take_stop_outcome(const Result<void>& outcome);
 
     // Storing, events (recording.cpp).
     void store_scan(const Scan& scan);
+    void write(StoreQueue::Write write, std::string_view key = {});
+    void tell_storage_news();
     void event(std::string_view kind, const std::string& message,
                const std::optional<std::string>& channel = {});
     ScanRecord record_of(const Scan& scan) const;
@@ -128,18 +139,20 @@ class Daemon {
     void close_overdue_scans();
     void arm_close_timer();
     void feed_watchdog();
+    void leave_nothing_unstored();
     void settle(std::int64_t scan);
 
     DaemonOptions options_;
     Clock& clock_;
-    Store store_;
+    StoreQueue storage_;
     SocketServer server_;
     HookRunner hooks_;
     LiveTest test_;
     std::optional<Scan> latest_;  ///< newest scan, in a test or not
     std::vector<double> newest_good_C_;
-    std::deque<ScanRecord> unstored_;  ///< acknowledged by nobody yet: the disk does not take them
-    std::uint64_t lost_scans_ = 0;     ///< dropped from unstored_ because it was full
+    FreezeWatch freeze_watch_;
+    TimeWatch time_watch_;
+    std::optional<AlarmWatch> alarm_watch_;  ///< of the test
     std::uint64_t generation_ = 0;
     std::optional<ScanAssembler> assembler_;
     RecentFigures lateness_ms_, commit_ms_, identification_s_;

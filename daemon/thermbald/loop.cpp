@@ -11,6 +11,7 @@
 #include "config/load.hpp"
 #include "daemon.hpp"
 #include "service/notify.hpp"
+#include "watches.hpp"
 
 namespace thermbal {
 namespace {
@@ -28,7 +29,10 @@ Result<void> check(int code, std::string_view what) {
 
 Result<std::unique_ptr<Daemon>> Daemon::create(DaemonOptions options, Clock& clock) {
     const Config& config = options.config;
-    auto store = Store::open(config.store.path, {clock.wall_ns(), clock.monotonic_ns()});
+    // Nobody waits for a lock for longer than a scan may: what the store does not take now waits in memory.
+    const StoreOptions store_options{
+        .busy_timeout_ms = std::clamp(static_cast<int>(config.test.period_s * 1000.0 / 8.0), 50, 2000)};
+    auto store = Store::open(config.store.path, {clock.wall_ns(), clock.monotonic_ns()}, store_options);
     if (!store) return std::unexpected(store.error());
     auto server = SocketServer::open(
         {.path = config.service.socket, .operators_group = config.service.operators_group});
@@ -44,9 +48,10 @@ Result<std::unique_ptr<Daemon>> Daemon::create(DaemonOptions options, Clock& clo
 Daemon::Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer server, HookRunner hooks)
     : options_(std::move(options)),
       clock_(clock),
-      store_(std::move(store)),
+      storage_(std::move(store)),
       server_(std::move(server)),
       hooks_(std::move(hooks)),
+      freeze_watch_(watched_modules(options_.config)),
       started_ns_(clock.monotonic_ns()),
       last_progress_ns_(real_monotonic_ns()) {
     newest_good_C_.assign(options_.config.channels.size(), no_value);
@@ -152,12 +157,12 @@ Result<void> Daemon::attach() {
 }
 
 Result<void> Daemon::run() {
-    auto resumed = store_.resume();
+    auto resumed = storage_.store().resume();
     if (!resumed) return std::unexpected(resumed.error());
-    if (store_.set_aside()) {
+    if (const auto& set_aside = storage_.store().set_aside()) {
         event("database_set_aside",
               fmt::format("the database was damaged; it is kept as {} and a new one is begun",
-                          store_.set_aside()->string()));
+                          set_aside->string()));
     }
     if (*resumed) {
         resume(std::move(**resumed));
@@ -173,8 +178,17 @@ Result<void> Daemon::run() {
                                            : "no test is running");
     feed_watchdog();
     const auto ended = check(sd_event_loop(loop_), "event loop");
+    leave_nothing_unstored();
     notify_stopping(is_measuring(test_.state) ? "the running test goes on at the next start" : "");
     return ended;
+}
+
+/// The last chance of what the database did not take.
+void Daemon::leave_nothing_unstored() {
+    storage_.flush();
+    if (storage_.unstored_writes() == 0) return;
+    spdlog::critical("{} scans that the database did not take are lost with this process: {}",
+                     storage_.unstored_scans(), storage_.problem());
 }
 
 void Daemon::on_line_readings() {
@@ -190,7 +204,7 @@ void Daemon::on_line_readings() {
 
 void Daemon::close_overdue_scans() {
     const std::uint64_t generation = generation_;
-    for (const Scan& scan :
+    for (Scan& scan :
          assembler_->take_closed(clock_.monotonic_ns() - close_grace_ns, clock_.wall_ns() - close_grace_ns)) {
         (scan.status == ScanStatus::missed ? scans_missed_
          : scan.status == ScanStatus::late ? scans_late_

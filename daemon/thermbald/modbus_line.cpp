@@ -1,5 +1,6 @@
 #include "modbus_line.hpp"
 
+#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
@@ -15,6 +16,17 @@ std::unique_ptr<Link> link_of(const LineConfig& line) {
     return make_link(std::move(options));
 }
 
+Sample calibrated(Sample sample, const Calibration& calibration) {
+    if (!sample.good() || calibration.none()) return sample;
+    sample.source_C = sample.value_C;
+    sample.value_C = calibrated_C(calibration, sample.source_C);
+    if (std::isfinite(sample.value_C)) return sample;
+    // Beyond what a platinum sensor can be: the module's number was no reading of one.
+    return {.raw = sample.raw,
+            .value_C = no_value,
+            .quality = sample.source_C > 0.0 ? Quality::over_range : Quality::under_range};
+}
+
 }  // namespace
 
 ModbusLine::ModbusLine(const Config& config, std::size_t line, std::function<std::int64_t()> real_ns, Log log)
@@ -28,7 +40,7 @@ ModbusLine::ModbusLine(const Config& config, std::size_t line, std::function<std
             const ChannelConfig& channel = config.channels[c];
             if (channel.unit == u) {
                 configured.channels.push_back(
-                    {c, static_cast<std::size_t>(channel.input - 1), channel.offset_C});
+                    {c, static_cast<std::size_t>(channel.input - 1), channel.calibration});
             }
         }
         units_.push_back(std::move(configured));
@@ -41,10 +53,8 @@ std::vector<ChannelSample> ModbusLine::read_scan() {
     for (std::size_t u = 0; u < units_.size(); ++u) {
         const ConfiguredUnit& unit = units_[u];
         const UnitReading reading = read_unit(*link_, unit.plan, real_ns_);
-        for (const auto& [channel, input, offset_C] : unit.channels) {
-            Sample sample = reading.samples[input];
-            if (sample.good()) sample.value_C += offset_C;
-            samples.push_back({channel, sample});
+        for (const auto& [channel, input, calibration] : unit.channels) {
+            samples.push_back({channel, calibrated(reading.samples[input], calibration)});
         }
         note(u, reading);
     }

@@ -47,7 +47,7 @@ class ModbusLine final : public Line {
     struct ConfiguredChannel {
         std::size_t channel;
         std::size_t input;  // 0-based
-        double offset_C;
+        Calibration calibration;
     };
     struct ConfiguredUnit {
         UnitPlan plan;

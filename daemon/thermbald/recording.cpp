@@ -1,3 +1,6 @@
+#include <memory>
+#include <utility>
+
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -21,32 +24,30 @@ ScanRecord Daemon::record_of(const Scan& scan) const {
 }
 
 void Daemon::store_scan(const Scan& scan) {
-    // 16 channels x 15 s: about 40 hours of a disk that does not take anything.
-    constexpr std::size_t most_unstored = 10'000;
-    if (unstored_.size() == most_unstored) {
-        unstored_.pop_front();
-        ++lost_scans_;
-    }
-    const bool waiting_already = !unstored_.empty();
-    unstored_.push_back(record_of(scan));
     const std::int64_t started_ns = real_monotonic_ns();
-    const std::vector<ScanRecord> records(unstored_.begin(), unstored_.end());
-    const auto stored = store_.append_scans(test_.id, records);
-    commit_ms_.add(static_cast<double>(real_monotonic_ns() - started_ns) * 1e-6);
-    if (stored) {
-        unstored_.clear();
-        if (waiting_already)
-            event("storage_back", fmt::format("{} scans kept in memory are stored now", records.size()));
-        return;
+    storage_.append_scan(test_.id, record_of(scan));
+    if (storage_.problem().empty()) {
+        commit_ms_.add(static_cast<double>(real_monotonic_ns() - started_ns) * 1e-6);
     }
-    if (stored.error().next == NextStep::refuse_input) {
-        lost_scans_ += unstored_.size();
-        unstored_.clear();
-        event("scan_refused",
-              fmt::format("scan {} is refused by the database: {}", scan.scan, stored.error().message));
-    } else if (!waiting_already) {
-        spdlog::error("the database does not take scans: {}; they are kept in memory, up to {}",
-                      stored.error().message, most_unstored);
+}
+
+void Daemon::write(StoreQueue::Write write, std::string_view key) {
+    storage_.write(std::move(write), key);
+}
+
+void Daemon::tell_storage_news() {
+    for (const StorageNews& news : storage_.take_news()) {
+        switch (news.kind) {
+            case StorageNews::Kind::away:
+                event("storage_away", news.message);
+                break;
+            case StorageNews::Kind::back:
+                event("storage_back", news.message);
+                break;
+            case StorageNews::Kind::refused:
+                event("storage_refused", news.message);
+                break;
+        }
     }
 }
 
@@ -62,10 +63,16 @@ void Daemon::event(std::string_view kind, const std::string& message,
     if (record.test_id)
         record.time_s = static_cast<double>(clock_.monotonic_ns() - test_.grid.start_ns) * 1e-9;
     spdlog::info("{}: {}", kind, message);
-    const auto id = store_.record_event(record);
-    if (!id) spdlog::warn("an event is not stored: {}", id.error().message);
+    // Shared with a write that may happen long after this call; 0 until then.
+    const auto id = std::make_shared<std::int64_t>(0);
+    write([record, id](Store& store) -> Result<void> {
+        const auto stored = store.record_event(record);
+        if (!stored) return std::unexpected(stored.error());
+        *id = *stored;
+        return {};
+    });
     server_.publish("event",
-                    {{"id", id.value_or(0)},
+                    {{"id", *id},
                      {"kind", kind},
                      {"time_s", record.time_s ? nlohmann::json(*record.time_s) : nlohmann::json(nullptr)},
                      {"channel", channel ? nlohmann::json(*channel) : nlohmann::json(nullptr)},

@@ -34,6 +34,7 @@ Result<std::int64_t> integer_param(const json& params, const char* key, std::int
 
 json sample_json(const Sample& sample) {
     return {{"value_C", sample.good() ? json(sample.value_C) : json(nullptr)},
+            {"source_C", number_or_null(sample.source_C)},
             {"raw", sample.raw ? json(*sample.raw) : json(nullptr)},
             {"quality", to_string(sample.quality)}};
 }
@@ -203,8 +204,8 @@ Result<json> Daemon::samples_json(const json& params) const {
     if (!wanted->empty() && std::ranges::find(channels, *wanted, &ChannelConfig::name) == channels.end()) {
         return bad_param(fmt::format("channel: there is no {}", *wanted));
     }
-    const auto scans =
-        store_.read().scans(test_.id, std::max<std::int64_t>(*from_scan, 0), *from_scan + *limit - 1);
+    const auto scans = storage_.store().read().scans(test_.id, std::max<std::int64_t>(*from_scan, 0),
+                                                     *from_scan + *limit - 1);
     if (!scans) return std::unexpected(scans.error());
     json rows = json::array();
     for (const ScanRecord& scan : *scans) {
@@ -257,7 +258,7 @@ Result<json> Daemon::events_json(const json& params) const {
     if (!after) return std::unexpected(after.error());
     const auto limit = integer_param(params, "limit", 200);
     if (!limit || *limit < 1 || *limit > 10'000) return bad_param("limit: expected 1 to 10000 events");
-    const auto events = store_.read().events(std::nullopt, *after, *limit);
+    const auto events = storage_.store().read().events(std::nullopt, *after, *limit);
     if (!events) return std::unexpected(events.error());
     json list = json::array();
     for (const EventRecord& event : *events) {
@@ -306,10 +307,14 @@ Result<json> Daemon::health_json() const {
                 {"lateness_ms", figures_json(lateness_ms_)},
                 {"commit_ms", figures_json(commit_ms_)},
                 {"identification_s", figures_json(identification_s_)},
-                {"unstored_scans", unstored_.size()},
-                {"lost_scans", lost_scans_},
-                {"wal_bytes", store_.wal_bytes()},
-                {"database_bytes", store_.database_bytes()},
+                {"unstored_scans", storage_.unstored_scans()},
+                {"unstored_scans_limit", storage_.limits().scans},
+                {"unstored_writes", storage_.unstored_writes()},
+                {"refused_writes", storage_.refused_writes()},
+                {"lost_scans", storage_.lost_scans()},
+                {"storage_problem", storage_.problem()},
+                {"wal_bytes", storage_.store().wal_bytes()},
+                {"database_bytes", storage_.store().database_bytes()},
                 {"cpu_s", seconds(usage.ru_utime) + seconds(usage.ru_stime)},
                 {"max_rss_bytes", usage.ru_maxrss * 1024},
                 {"clients", counters.clients},

@@ -5,7 +5,7 @@
 
 namespace thermbal {
 
-void Daemon::carry_out_stop() {
+void Daemon::carry_out_stop(TestState state) {
     const StopConfig& stop = options_.config.stop;
     switch (stop.action) {
         case StopConfig::Action::none:
@@ -20,7 +20,7 @@ void Daemon::carry_out_stop() {
     const Hook hook{.argv = stop.command,
                     .environment = {{"THERMBAL_TEST_ID", std::to_string(test_.id)},
                                     {"THERMBAL_TEST_NAME", test_.name},
-                                    {"THERMBAL_STATE", std::string(to_string(test_.state))},
+                                    {"THERMBAL_STATE", std::string(to_string(state))},
                                     {"THERMBAL_REASON", test_.end_reason},
                                     {"THERMBAL_DATABASE", options_.config.store.path}},
                     .timeout = std::chrono::milliseconds(static_cast<std::int64_t>(stop.timeout_s * 1e3))};

@@ -11,6 +11,7 @@
 #include "flow_options.hpp"
 #include "report/spectrum_json.hpp"
 #include "report/verdict_json.hpp"
+#include "watches.hpp"
 
 namespace thermbal {
 namespace {
@@ -41,9 +42,15 @@ Result<TestId> Daemon::start_test(const std::string& name, const std::string& ma
     for (const ChannelConfig& channel : config.channels) {
         record.channels.push_back({channel.name,
                                    channel.role == ChannelConfig::Role::ambient ? "ambient" : "structure",
-                                   channel.place, channel.required, describe_source(config, channel)});
+                                   channel.place, channel.required, describe_source(config, channel),
+                                   describe(channel.calibration)});
     }
-    const auto id = store_.begin_test(record);
+    storage_.flush();
+    if (!storage_.problem().empty()) {
+        return fail(NextStep::retry,
+                    fmt::format("no test is begun while the database takes nothing: {}", storage_.problem()));
+    }
+    const auto id = storage_.store().begin_test(record);
     if (!id) return id;
 
     test_ = LiveTest{};
@@ -65,7 +72,7 @@ void Daemon::prepare_flow(const std::string& machine) {
     auto flow = std::make_shared<FlowOptions>(flow_options(options_.config));
     test_.machine = machine;
     if (!machine.empty()) {
-        auto earlier = prior_of_machine(store_.read(), machine, flow->spectrum);
+        auto earlier = prior_of_machine(storage_.store().read(), machine, flow->spectrum);
         if (!earlier) {
             event("archive_unread", earlier.error().message);
         } else if (earlier->prior) {
@@ -85,9 +92,10 @@ void Daemon::archive_test() {
                                .test_id = test_.id,
                                .created_wall_ns = clock_.wall_ns(),
                                .spectrum_json = spectrum_to_json(*test_.spectrum).dump()};
-    if (const auto stored = store_.record_archive(record); !stored) {
-        spdlog::warn("what test {} taught is not stored: {}", test_.id, stored.error().message);
-    }
+    write([record](Store& store) -> Result<void> {
+        const auto stored = store.record_archive(record);
+        return stored ? Result<void>() : std::unexpected(stored.error());
+    });
 }
 
 void Daemon::begin_window(double period_s) {
@@ -95,6 +103,7 @@ void Daemon::begin_window(double period_s) {
     for (const ChannelConfig& channel : options_.config.channels)
         test_.window.channels.push_back({channel.name, {}});
     newest_good_C_.assign(options_.config.channels.size(), no_value);
+    alarm_watch_.emplace(alarm_limits(options_.config), options_.config.channels.size());
 }
 
 /// Goes on with a test that was open when the daemon ended: the same test, the scans that are stored, the
@@ -134,6 +143,8 @@ void Daemon::resume(ResumedTest resumed) {
             if (channel < again.samples.size()) again.samples[channel] = scan.samples[i];
         }
         grow_window(again);
+        // Only so that a limit goes on where it was: what was an alarm has ended the test then.
+        alarm_watch_->take(test_.grid.time_s(again.scan), again.samples);
     }
     std::vector<ChannelVerdict> verdicts;
     for (const IdentificationRecord& identification : resumed.identifications) {
@@ -153,6 +164,7 @@ void Daemon::resume(ResumedTest resumed) {
 
 void Daemon::follow_grid(Grid grid, std::int64_t first_scan) {
     ++generation_;
+    freeze_watch_.begin_grid();
     std::vector<std::size_t> channel_line;
     for (const ChannelConfig& channel : options_.config.channels) {
         channel_line.push_back(options_.config.units[channel.unit].line);

@@ -117,6 +117,58 @@ TEST_F(StoreTest, CsvIsTheRecordedTest) {
     EXPECT_EQ(recorded->inputs[0].name, "spindle_rpm");
 }
 
+TEST_F(StoreTest, WhatTheModuleSaidStandsBesideWhatTheCalibrationMadeOfIt) {
+    auto store = open_store(path);
+    TestRecord record = test_record(2);
+    record.channels[1].calibration = "certificate K-2231: R0 100.012 ohm";
+    const auto id = store.begin_test(record);
+    ScanRecord scan = scan_record(0, 2);
+    scan.samples[1].source_C = 18.25;
+    ASSERT_OK(store.append_scan(*id, scan));
+    const auto scans = store.read().scans(*id);
+    ASSERT_OK(scans);
+    EXPECT_TRUE(std::isnan(scans->front().samples[0].source_C));
+    EXPECT_EQ(scans->front().samples[1].source_C, 18.25);
+    EXPECT_EQ(scans->front().samples[1].value_C, value_C(0, 1));
+    EXPECT_EQ(store.read().test(*id)->record.channels[1].calibration, record.channels[1].calibration);
+    EXPECT_EQ(Direct(path).integer("SELECT count(*) FROM readings WHERE source_C = 18.25"), 1);
+}
+
+TEST_F(StoreTest, FrozenSamplesLoseTheirValueAndKeepTheirRegister) {
+    auto store = open_store(path);
+    const auto id = store.begin_test(test_record(3));
+    for (std::int64_t k = 0; k < 10; ++k) {
+        ScanRecord scan = scan_record(k, 3);
+        if (k == 6) scan.samples[1] = {30000U, no_value, Quality::open};
+        ASSERT_OK(store.append_scan(*id, scan));
+    }
+    const std::size_t channels[] = {1, 2};
+    const auto marked = store.mark_stuck(*id, channels, 5, 8);
+    ASSERT_OK(marked);
+    EXPECT_EQ(*marked, 7);
+    const auto scans = store.read().scans(*id);
+    EXPECT_EQ((*scans)[5].samples[0].quality, Quality::good);
+    EXPECT_EQ((*scans)[5].samples[1].quality, Quality::stuck);
+    EXPECT_EQ((*scans)[5].samples[1].raw, 181U);
+    EXPECT_EQ((*scans)[6].samples[1].quality, Quality::open) << "a fault code stays what it is";
+    EXPECT_EQ((*scans)[9].samples[2].quality, Quality::good);
+    EXPECT_THAT(findings_text(*store.read().verify()), IsEmpty());
+}
+
+TEST_F(StoreTest, AScanFillsAHoleOnlyWhereItFits) {
+    auto store = open_store(path);
+    const auto id = store.begin_test(test_record());
+    for (const std::int64_t k : {0, 3, 4}) ASSERT_OK(store.append_scan(*id, scan_record(k)));
+    ScanRecord wrong = scan_record(2);
+    wrong.time_s = 100.0;
+    EXPECT_THAT(store.append_scan(*id, wrong).error().message,
+                HasSubstr("not before 45.02 of the scan after"));
+    const ScanRecord both[] = {scan_record(1), scan_record(2), scan_record(5)};
+    ASSERT_OK(store.append_scans(*id, both));
+    EXPECT_EQ(store.read().scans(*id)->size(), 6U);
+    EXPECT_THAT(findings_text(*store.read().verify()), IsEmpty());
+}
+
 TEST_F(StoreTest, TheSameScanAgainIsAcknowledgedAndStoredOnce) {
     auto store = open_store(path);
     const auto id = store.begin_test(test_record());

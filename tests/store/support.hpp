@@ -19,10 +19,15 @@ namespace thermbal::test {
 constexpr std::int64_t period_ns = 15'000'000'000;
 constexpr Moment start{1'700'000'000'000'000'000, 5'000'000'000};
 
+/// Where a file costs no disk: for what is opened hundreds of times.
+inline std::filesystem::path memory_folder() {
+    return std::filesystem::is_directory("/dev/shm") ? "/dev/shm" : std::filesystem::temp_directory_path();
+}
+
 class Folder {
   public:
-    Folder() {
-        std::string name = (std::filesystem::temp_directory_path() / "thermbal-store-XXXXXX").string();
+    explicit Folder(const std::filesystem::path& parent = std::filesystem::temp_directory_path()) {
+        std::string name = (parent / "thermbal-store-XXXXXX").string();
         path_ = mkdtemp(name.data());
     }
     Folder(const Folder&) = delete;

@@ -57,7 +57,8 @@ TEST_F(VerifyTest, AValueWithoutGoodQuality) {
 }
 
 TEST_F(VerifyTest, ARowThatRefersToNothing) {
-    EXPECT_THAT(after("INSERT INTO samples VALUES (1, 99, 0, 1, 20.0, 'good')"),
+    EXPECT_THAT(after("INSERT INTO samples (test_id, scan, channel, raw, value_C, quality) VALUES (1, 99, 0, "
+                      "1, 20.0, 'good')"),
                 HasSubstr("samples: a row refers to scans"));
 }
 

@@ -8,6 +8,7 @@
 #include "modbus/link.hpp"
 #include "modbus/profile.hpp"
 #include "serial/ports.hpp"
+#include "series/calibration.hpp"
 
 namespace thermbal {
 
@@ -47,6 +48,7 @@ struct UnitConfig {
     int unit_id = 1;
     std::string profile_name;  ///< as the configuration names it: a name or a path
     ModuleProfile profile;
+    double frozen_after_min = 30.0;  ///< no word of the module has changed for so long: its samples are stuck
 };
 
 struct ChannelConfig {
@@ -56,8 +58,19 @@ struct ChannelConfig {
     int input = 1;         ///< 1-based, as printed on the module
     Role role = Role::structure;
     std::string place;
-    bool required = true;   ///< the test ends only when it is declared; default false for the ambient
-    double offset_C = 0.0;  ///< added to the reading: the channel's calibration
+    bool required = true;  ///< the test ends only when it is declared; default false for the ambient
+    Calibration calibration;
+};
+
+/// Limits that abort a test. At least one of the three is set.
+struct AlarmConfig {
+    std::string name;
+    std::optional<std::size_t> channel;  ///< index into Config::channels; empty: every channel
+    std::optional<double> above_C;
+    std::optional<double> below_C;
+    std::optional<double> rate_C_per_min;  ///< rising or falling
+    double rate_over_min = 2.0;
+    int scans = 2;  ///< good samples in a row that have to be beyond the limit
 };
 
 /// Plain numbers; core's own option structs are filled from these by the daemon.
@@ -88,6 +101,7 @@ struct Config {
     std::vector<LineConfig> lines;
     std::vector<UnitConfig> units;
     std::vector<ChannelConfig> channels;
+    std::vector<AlarmConfig> alarms;
     IdentificationConfig identification;
     StopConfig stop;
 

@@ -28,11 +28,13 @@ std::optional<Quality> quality_from_string(std::string_view name);
 inline constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
 
 /// One channel at one scan. `raw` is the register as the module sent it (16 or 32 bits, sign not applied);
-/// empty when the module did not answer.
+/// empty when the module did not answer. `source_C` is what the module said where a calibration has made value_C
+/// of it; NaN where value_C is what the module said.
 struct Sample {
     std::optional<std::uint32_t> raw;
     double value_C = no_value;
     Quality quality = Quality::gap;
+    double source_C = no_value;
 
     bool good() const { return quality == Quality::good && std::isfinite(value_C); }
 };

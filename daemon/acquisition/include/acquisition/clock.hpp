@@ -8,6 +8,13 @@
 
 namespace thermbal {
 
+/// The clocks of a host, read together.
+struct ClockReading {
+    std::int64_t boot_ns = 0;   ///< goes on while the host sleeps: what the grid runs on
+    std::int64_t awake_ns = 0;  ///< stands still while the host sleeps
+    std::int64_t wall_ns = 0;   ///< UTC since 1970; is set by people and time servers
+};
+
 /// The one place that reads time. Everything else takes it as an argument or asks a Clock. All members may be
 /// called from any thread. monotonic_ns never jumps back and counts through a suspend; wall_ns is UTC since
 /// 1970 and may jump.
@@ -16,6 +23,8 @@ class Clock {
     virtual ~Clock() = default;
     virtual std::int64_t monotonic_ns() const = 0;
     virtual std::int64_t wall_ns() const = 0;
+    /// A clock that knows no sleep says monotonic_ns for both.
+    virtual ClockReading read() const { return {monotonic_ns(), monotonic_ns(), wall_ns()}; }
 
     /// Blocks until monotonic_ns() >= deadline_ns (true), or a stop is requested or wakes() is no longer
     /// seen_wakes (false). Taking seen_wakes before looking at one's plan leaves no moment in which a wake()

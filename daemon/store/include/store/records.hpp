@@ -25,7 +25,8 @@ struct ChannelRecord {
     std::string role;  ///< as configured: "ambient", "machine", ...
     std::string place;
     bool required = true;
-    std::string source;  ///< where it is read, for a person: "unit 1, input 5"
+    std::string source;            ///< where it is read, for a person: "unit 1, input 5"
+    std::string calibration = {};  ///< what was made of the reading, for a person; empty: nothing
 };
 
 /// What is known when a test begins. The order of `channels` is the order of ScanRecord::samples.

@@ -50,13 +50,18 @@ class Store {
     /// Refused while another test is open.
     Result<TestId> begin_test(const TestRecord& test);
 
-    /// Acknowledged means on the disk. `scan` must be above the last one stored. The very scan that is
-    /// already there (same times and status: a repetition after a doubtful error) is acknowledged again, not
-    /// stored twice.
+    /// Acknowledged means on the disk. `scan` is above the last one stored, or fills a hole. The very scan
+    /// that is already there (same times and status: a repetition after a doubtful error) is acknowledged
+    /// again, not stored twice.
     Result<void> append_scan(TestId id, const ScanRecord& scan);
     /// Several scans, all or none: those kept in memory while the disk was away, or the missed ones after a
     /// restart.
     Result<void> append_scans(TestId id, std::span<const ScanRecord> scans);
+
+    /// The good samples of these channels (positions) in first_scan ... last_scan turn out not to be
+    /// readings: they become `stuck` and lose their value, the raw register stays. Returns how many.
+    Result<std::int64_t> mark_stuck(TestId id, std::span<const std::size_t> channels, std::int64_t first_scan,
+                                    std::int64_t last_scan);
 
     /// One standing declaration a channel: a second one is refused until the first is withdrawn.
     Result<void> record_declaration(TestId id, const DeclarationRecord& declaration);
