@@ -56,17 +56,19 @@ Answers svr(const EstimatorInput& input) {
     });
 }
 
+/// Isolated outliers as missing samples, for what has no filter of its own.
+TestWindow without_outliers(TestWindow window, const OutlierOptions& options) {
+    for (Column& column : window.channels) {
+        auto marked = mark_outliers(column.values, options);
+        if (marked) column.values = std::move(marked->values_C);
+    }
+    return window;
+}
+
 Answers exponentials(const EstimatorInput& input, std::size_t count) {
-    // One Hampel filter for all that have none of their own.
+    const TestWindow window = without_outliers(input.window, input.options.outliers);
     return for_each_channel(input, [&](const Column& column) {
-        const auto marked = mark_outliers(column.values, input.options.outliers);
-        if (!marked) return no_answer(marked.error());
-        const TestWindow alone{input.window.start_s,
-                               input.window.period_s,
-                               input.window.scans,
-                               {{column.name, marked->values_C}},
-                               {}};
-        const auto fit = fit_exponentials(alone, column.name, count);
+        const auto fit = fit_exponentials(window, column.name, count);
         if (!fit) return no_answer(fit.error());
         return normal_answer(fit->steady_state_C, fit->steady_state_sd_C,
                              fit->equilibrium_time_min + input.window.start_s / 60.0);
@@ -151,11 +153,11 @@ RecordingEnd end_of_recording(const TestWindow& recording, const std::vector<std
                               const FlowOptions& options, const MeasuredEndOptions& end_options) {
     constexpr std::size_t most_modes = 4;
     const Regime regime = current_regime(recording, options);
-    RecordingEnd end{regime.since_s / 60.0,
-                     {},
-                     fit_shared_modes_of_best_order(regime.window, options.ambient, most_modes)};
+    const TestWindow window = without_outliers(regime.window, options.outliers);
+    RecordingEnd end{
+        regime.since_s / 60.0, {}, fit_shared_modes_of_best_order(window, options.ambient, most_modes)};
     for (const std::string& channel : channels)
-        end.channels.push_back(measured_end(regime.window, channel, options.ambient, end_options));
+        end.channels.push_back(measured_end(window, channel, options.ambient, end_options));
     return end;
 }
 

@@ -39,14 +39,19 @@ Result<ExponentialFit> fit_exponentials(const TestWindow& window, std::string_vi
     const Column* const column = window.channel(channel);
     if (column == nullptr)
         return fail(NextStep::refuse_input, fmt::format("channel {} is not in the recording", channel));
-    const TestWindow alone{window.start_s, window.period_s, window.scans, {*column}, {}};
+    // Whole minutes, which the fit takes the means of: a last one of a single sample would weigh as much as
+    // the others.
+    const auto samples_a_min = static_cast<std::size_t>(std::max(1.0, std::round(60.0 / window.period_s)));
+    TestWindow alone{
+        window.start_s, window.period_s, window.scans / samples_a_min * samples_a_min, {*column}, {}};
+    alone.channels.front().values.resize(alone.scans);
     Result<SharedModes> fit = fit_shared_modes(alone, "", exponentials);
     if (!fit) return std::unexpected(fit.error());
 
     SharedModes::Channel& only = fit->channels.front();
     // What a block's mean leaves over, as the scatter of one sample: the misfit of the order counts as noise.
-    const double samples_a_min = std::max(1.0, 60.0 / window.period_s);
-    only.noise_C = std::max(only.noise_C, fit->residual_rms_C * std::sqrt(samples_a_min));
+    only.noise_C =
+        std::max(only.noise_C, fit->residual_rms_C * std::sqrt(static_cast<double>(samples_a_min)));
     ExponentialFit result;
     result.start_C = only.level_C;
     result.steady_state_C = only.level_C;

@@ -86,6 +86,19 @@ Fit evaluate(const Series& series, const Columns& columns) {
     return fit;
 }
 
+/// Of one sample, from second differences: a steep start is no noise. 0 with too few samples in a row.
+double sample_variance(const std::vector<double>& values) {
+    double sum = 0.0;
+    std::size_t count = 0;
+    for (std::size_t k = 2; k < values.size(); ++k) {
+        const double bend = values[k] - 2.0 * values[k - 1] + values[k - 2];
+        if (std::isnan(bend)) continue;
+        sum += bend * bend;
+        ++count;
+    }
+    return count == 0 ? 0.0 : sum / (6.0 * static_cast<double>(count));
+}
+
 Result<Series> structural_series(const TestWindow& window, std::string_view ambient, std::size_t per_block) {
     const auto rows = static_cast<Eigen::Index>((window.scans + per_block - 1) / per_block);
     std::vector<const Column*> columns;
@@ -110,8 +123,7 @@ Result<Series> structural_series(const TestWindow& window, std::string_view ambi
         series.centre[i] = blocks.centre_C;
         series.values.col(i) = blocks.mean;
         series.present.col(i) = (blocks.count.array() > 0.0).cast<double>();
-        const double freedom = static_cast<double>(blocks.good) - series.present.col(i).sum();
-        const double variance = freedom > 0.0 ? blocks.within_sum / freedom : 0.0;
+        const double variance = sample_variance(column.values);
         const double rounding = std::pow(smallest_step(column.values), 2) / 12.0;
         series.sample_sigma[i] = std::sqrt(std::max({variance, rounding, 1e-6}));
         series.sigma[i] = series.sample_sigma[i] / std::sqrt(static_cast<double>(per_block));
