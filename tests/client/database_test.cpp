@@ -1,9 +1,6 @@
 // thermbalctl's commands on a database that the store itself wrote.
-#include <array>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <memory>
 #include <sstream>
 
 #include <fmt/format.h>
@@ -11,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "program.hpp"
 #include "store/store.hpp"
 
 namespace thermbal::test {
@@ -18,23 +16,6 @@ namespace {
 
 using nlohmann::json;
 using ::testing::HasSubstr;
-
-struct Output {
-    std::string text;  ///< both streams
-    int status = -1;
-};
-
-Output run(const std::string& arguments) {
-    const std::string command = fmt::format("{}/thermbalctl {} 2>&1", THERMBAL_BIN_DIR, arguments);
-    std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(popen(command.c_str(), "r"), pclose);
-    Output output;
-    std::array<char, 4096> buffer;
-    for (std::size_t got = 0; (got = std::fread(buffer.data(), 1, buffer.size(), pipe.get())) > 0;) {
-        output.text.append(buffer.data(), got);
-    }
-    output.status = WEXITSTATUS(pclose(pipe.release()));
-    return output;
-}
 
 class Database : public ::testing::Test {
   protected:
