@@ -25,7 +25,9 @@ class Checker {
         if (mistakes_.empty()) check_connected();
         for (std::size_t i = 0; i < model_.sources.size(); ++i) check_source(i);
         for (std::size_t i = 0; i < model_.sensors.size(); ++i) check_sensor(i);
-        for (std::size_t i = 0; i < model_.effects.size(); ++i) check_effect(i);
+        // An effect is judged against the places of a network that is sound.
+        const std::size_t effects = mistakes_.empty() ? model_.effects.size() : 0;
+        for (std::size_t i = 0; i < effects; ++i) check_effect(i);
         return std::move(mistakes_);
     }
 
@@ -195,7 +197,8 @@ class Checker {
             const double value = effect.parameter(parameter.name);
             if (std::isnan(value)) {
                 if (!parameter.when_absent) {
-                    complain(Table::effect, i, parameter.name, "is missing; accepted: " + form.equation);
+                    complain(Table::effect, i, parameter.name,
+                             fmt::format("is missing; accepted: a number, in {}", form.equation));
                 }
             } else if (!std::isfinite(value) || (parameter.logarithmic && value <= 0.0)) {
                 complain(Table::effect, i, parameter.name,

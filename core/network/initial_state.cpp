@@ -40,9 +40,9 @@ Eigen::VectorXd initial_temperatures(const CompiledNetwork& network, const Model
     const Eigen::VectorXd known_C = first_node_readings(network, model, inputs);
     const Index count = known_C.size();
     if (known_C.array().isFinite().all()) return known_C;
-    // T_i = mean of its neighbours, unknown ones included; a pull to the ambient too weak to matter decides
-    // where no link leads to a reading.
-    constexpr double pull = 1e-9;
+    // T_i = mean of its neighbours, unknown ones included, in differences to the ambient; a pull to it that
+    // is too weak to matter decides where no link leads to a reading.
+    constexpr double pull = 1e-12;
     Eigen::MatrixXd equations = Eigen::MatrixXd::Identity(count, count) * pull;
     for (const CompiledLink& link : network.links) {
         const auto a = static_cast<Index>(link.a);
@@ -52,14 +52,14 @@ Eigen::VectorXd initial_temperatures(const CompiledNetwork& network, const Model
         equations(a, b) -= 1.0;
         equations(b, a) -= 1.0;
     }
-    Eigen::VectorXd right = Eigen::VectorXd::Constant(count, pull * ambient_C);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(count);
     for (Index i = 0; i < count; ++i) {
         if (!std::isfinite(known_C[i])) continue;
         equations.row(i).setZero();
         equations(i, i) = 1.0;
-        right[i] = known_C[i];
+        right[i] = known_C[i] - ambient_C;
     }
-    return equations.partialPivLu().solve(right);
+    return equations.partialPivLu().solve(right).array() + ambient_C;
 }
 
 }  // namespace thermbal
