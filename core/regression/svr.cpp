@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include <Eigen/Core>
+#include "regression/vector_loops.hpp"
 
 namespace thermbal {
 namespace {
@@ -34,20 +34,19 @@ SvrModel::SvrModel(const LagProblem& problem, const std::vector<std::size_t>& ro
       minus_inverse_sigma2_(-1.0 / (sigma * sigma)),
       bias_(bias),
       coefficients_(std::move(coefficients)) {
+    coefficients_.resize(vector_loops::padded(rows.size()), 0.0);
+    vectors_.resize(lags_ * coefficients_.size(), 0.0);
     for (std::size_t lag = 0; lag < lags_; ++lag) {
-        for (const std::size_t row : rows) vectors_.push_back(problem.unit[row + lag]);
+        for (std::size_t k = 0; k < rows.size(); ++k) {
+            vectors_[lag * coefficients_.size() + k] = problem.unit[rows[k] + lag];
+        }
     }
 }
 
 double SvrModel::predict_unit(std::span<const double> newest_last) const {
-    const auto count = static_cast<Eigen::Index>(coefficients_.size());
-    Eigen::ArrayXd distance = Eigen::ArrayXd::Zero(count);
-    for (std::size_t lag = 0; lag < lags_; ++lag) {
-        const Eigen::Map<const Eigen::ArrayXd> vectors(vectors_.data() + lag * coefficients_.size(), count);
-        distance += (vectors - newest_last[lag]).square();
-    }
-    const Eigen::Map<const Eigen::ArrayXd> coefficients(coefficients_.data(), count);
-    return (coefficients * (distance * minus_inverse_sigma2_).exp()).sum() + bias_;
+    return bias_ + vector_loops::weighted_gaussians(vectors_.data(), coefficients_.size(),
+                                                    coefficients_.data(), newest_last.data(), lags_,
+                                                    minus_inverse_sigma2_);
 }
 
 }  // namespace thermbal

@@ -13,6 +13,14 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+namespace {
+
+Index padded(Index count) {
+    return static_cast<Index>(vector_loops::padded(static_cast<std::size_t>(count)));
+}
+
+}  // namespace
+
 TubeSolver::TubeSolver(MatrixXd features, VectorXd targets, double epsilon)
     : features_(std::move(features)),
       by_row_(features_.transpose()),
@@ -31,7 +39,7 @@ TubeSolver::State TubeSolver::cold_start() const {
     return {VectorXd::Zero(features_.cols()), *middle};
 }
 
-bool TubeSolver::fit(double C, const State& start, const Schedule& schedule) {
+void TubeSolver::start(double C, const State& start) {
     state_ = start;
     vector_loops::multiply_columns(features_.data(), static_cast<std::size_t>(features_.rows()),
                                    static_cast<std::size_t>(features_.cols()), state_.weights.data(),
@@ -42,6 +50,17 @@ bool TubeSolver::fit(double C, const State& start, const Schedule& schedule) {
     slope_sum_ *= C / tube_.C;
     tube_.C = C;
     tube_.epsilon = epsilon_;
+}
+
+bool TubeSolver::descend_to(double smoothing, int most_steps) {
+    const bool converged = descend(smoothing, 0.3 * smoothing, most_steps);
+    take_slopes();
+    centre_undetermined_bias();
+    return converged;
+}
+
+bool TubeSolver::fit(double C, const State& from, const Schedule& schedule) {
+    start(C, from);
     double smoothing = std::max(schedule.first_smoothing, schedule.last_smoothing);
     while (smoothing > schedule.last_smoothing) {
         if (!descend(smoothing, 0.3 * smoothing, schedule.most_steps)) return false;
@@ -102,8 +121,10 @@ void TubeSolver::newton_direction() {
         bias_direction_ = -bias_gradient_ / (1e-3 * curvature);
         return;
     }
-    bent_.resize(rank, rows);
-    for (Index k = 0; k < rows; ++k) bent_.col(k) = by_row_.col(bending_[static_cast<std::size_t>(k)]);
+    bent_.setZero(padded(rank), rows);
+    for (Index k = 0; k < rows; ++k) {
+        bent_.col(k).head(rank) = by_row_.col(bending_[static_cast<std::size_t>(k)]);
+    }
     if (rows > rank) {
         direction_in_feature_space(curvature);
     } else {
@@ -112,30 +133,38 @@ void TubeSolver::newton_direction() {
 }
 
 void TubeSolver::direction_in_feature_space(double curvature) {
+    const Index rank = features_.cols();
     const VectorXd mean = bent_.rowwise().mean();
     bent_.colwise() -= mean;
-    square_.setZero(bent_.rows(), bent_.rows());
-    vector_loops::add_outer_products(bent_.data(), static_cast<std::size_t>(bent_.rows()),
-                                     static_cast<std::size_t>(bent_.cols()), square_.data());
-    square_ *= curvature;
-    square_.diagonal().array() += 1.0;
-    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(square_);
-    direction_ = factor.solve(mean * bias_gradient_ - gradient_);
+    auto system = square_of(bent_, rank);
+    system *= curvature;
+    system.diagonal().array() += 1.0;
+    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(system);
+    direction_ = factor.solve(mean.head(rank) * bias_gradient_ - gradient_);
     bias_direction_ =
-        -bias_gradient_ / (curvature * static_cast<double>(bent_.cols())) - mean.dot(direction_);
+        -bias_gradient_ / (curvature * static_cast<double>(bent_.cols())) - mean.head(rank).dot(direction_);
 }
 
 void TubeSolver::direction_in_row_space(double curvature) {
-    const MatrixXd by_feature = bent_.transpose();
-    square_.setZero(by_feature.rows(), by_feature.rows());
-    vector_loops::add_outer_products(by_feature.data(), static_cast<std::size_t>(by_feature.rows()),
-                                     static_cast<std::size_t>(by_feature.cols()), square_.data());
-    square_.diagonal().array() += 1.0 / curvature;
-    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(square_);
-    const VectorXd without_bias = factor.solve(-(by_feature * gradient_));
-    const VectorXd of_bias = factor.solve(VectorXd::Ones(by_feature.rows()));
+    const Index rank = features_.cols();
+    const Index rows = bent_.cols();
+    by_feature_.setZero(padded(rows), rank);
+    by_feature_.topRows(rows) = bent_.topRows(rank).transpose();
+    auto system = square_of(by_feature_, rows);
+    system.diagonal().array() += 1.0 / curvature;
+    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(system);
+    const VectorXd without_bias = factor.solve(-(by_feature_.topRows(rows) * gradient_));
+    const VectorXd of_bias = factor.solve(VectorXd::Ones(rows));
     bias_direction_ = (-bias_gradient_ - without_bias.sum()) / of_bias.sum();
-    direction_ = -gradient_ - bent_ * (without_bias + bias_direction_ * of_bias);
+    direction_ = -gradient_ - bent_.topRows(rank) * (without_bias + bias_direction_ * of_bias);
+}
+
+/// The lower triangle of the sum of v v' over the columns v of `vectors`, without the padding.
+Eigen::Ref<MatrixXd> TubeSolver::square_of(const MatrixXd& vectors, Index length) {
+    square_.setZero(vectors.rows(), vectors.rows());
+    vector_loops::add_outer_products(vectors.data(), static_cast<std::size_t>(vectors.rows()),
+                                     static_cast<std::size_t>(vectors.cols()), square_.data());
+    return square_.topLeftCorner(length, length);
 }
 
 /// The objective along the direction is convex and piecewise quadratic: safeguarded Newton to a slope a fifth

@@ -16,12 +16,39 @@
 namespace thermbal::vector_loops {
 namespace {
 
-constexpr std::size_t lanes = 8;
+constexpr std::size_t lanes = lane_count;
 using Lanes = std::array<double, lanes>;
 
 /// Always in the same order, whatever the processor.
 inline double total(const Lanes& sums) {
     return ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
+}
+
+/// 2^k e^f with k = round(x / ln 2), |f| <= ln 2 / 2, e^f by its Taylor polynomial of degree 12.
+[[gnu::always_inline]] inline double exp_of(double x) {
+    constexpr double log2_e = 1.4426950408889634;
+    constexpr double ln2_high = 6.93147180369123816490e-01;
+    constexpr double ln2_low = 1.90821492927058770002e-10;
+    constexpr double to_integer =
+        6755399441055744.0;  // 1.5 * 2^52: the sum's low bits are the rounded integer
+    const double shifted = x * log2_e + to_integer;
+    const double k = shifted - to_integer;
+    const double f = (x - k * ln2_high) - k * ln2_low;
+    double p = 1.0 / 479001600.0;
+    p = p * f + 1.0 / 39916800.0;
+    p = p * f + 1.0 / 3628800.0;
+    p = p * f + 1.0 / 362880.0;
+    p = p * f + 1.0 / 40320.0;
+    p = p * f + 1.0 / 5040.0;
+    p = p * f + 1.0 / 720.0;
+    p = p * f + 1.0 / 120.0;
+    p = p * f + 1.0 / 24.0;
+    p = p * f + 1.0 / 6.0;
+    p = p * f + 0.5;
+    p = p * f + 1.0;
+    p = p * f + 1.0;
+    const std::uint64_t exponent = (std::bit_cast<std::uint64_t>(shifted) + 1023) << 52;
+    return p * std::bit_cast<double>(exponent);
 }
 
 }  // namespace
@@ -67,27 +94,26 @@ void subtract_columns(const double* __restrict matrix, std::size_t rows, std::si
     }
 }
 
+/// Blocks of 8 x 4 elements stay in registers over all vectors.
 THERMBAL_EVERY_WIDTH
 void add_outer_products(const double* __restrict vectors, std::size_t length, std::size_t count,
                         double* __restrict lower) {
-    std::size_t v = 0;
-    for (; v + 4 <= count; v += 4) {
-        const double* a = vectors + v * length;
-        const double* b = a + length;
-        const double* c = b + length;
-        const double* d = c + length;
-        for (std::size_t j = 0; j < length; ++j) {
-            double* column = lower + j * length;
-            for (std::size_t i = j; i < length; ++i) {
-                column[i] += (a[j] * a[i] + b[j] * b[i]) + (c[j] * c[i] + d[j] * d[i]);
+    constexpr std::size_t block_columns = 4;
+    for (std::size_t j = 0; j < length; j += block_columns) {
+        for (std::size_t i = j / lanes * lanes; i < length; i += lanes) {
+            std::array<Lanes, block_columns> sums{};
+            for (std::size_t v = 0; v < count; ++v) {
+                const double* vector = vectors + v * length;
+                for (std::size_t c = 0; c < block_columns; ++c) {
+                    for (std::size_t lane = 0; lane < lanes; ++lane) {
+                        sums[c][lane] += vector[j + c] * vector[i + lane];
+                    }
+                }
             }
-        }
-    }
-    for (; v < count; ++v) {
-        const double* a = vectors + v * length;
-        for (std::size_t j = 0; j < length; ++j) {
-            double* column = lower + j * length;
-            for (std::size_t i = j; i < length; ++i) column[i] += a[j] * a[i];
+            for (std::size_t c = 0; c < block_columns; ++c) {
+                double* column = lower + (j + c) * length + i;
+                for (std::size_t lane = 0; lane < lanes; ++lane) column[lane] += sums[c][lane];
+            }
         }
     }
 }
@@ -106,35 +132,30 @@ void squared_distances_to(const double* const* lagged, std::size_t rows, const d
     }
 }
 
-/// 2^k e^f with k = round(x / ln 2), |f| <= ln 2 / 2, e^f by its Taylor polynomial of degree 12.
 THERMBAL_EVERY_WIDTH
 void scaled_exp(double* __restrict values, std::size_t count, double factor) {
-    constexpr double log2_e = 1.4426950408889634;
-    constexpr double ln2_high = 6.93147180369123816490e-01;
-    constexpr double ln2_low = 1.90821492927058770002e-10;
-    constexpr double to_integer =
-        6755399441055744.0;  // 1.5 * 2^52: the sum's low bits are the rounded integer
-    for (std::size_t i = 0; i < count; ++i) {
-        const double x = factor * values[i];
-        const double shifted = x * log2_e + to_integer;
-        const double k = shifted - to_integer;
-        const double f = (x - k * ln2_high) - k * ln2_low;
-        double p = 1.0 / 479001600.0;
-        p = p * f + 1.0 / 39916800.0;
-        p = p * f + 1.0 / 3628800.0;
-        p = p * f + 1.0 / 362880.0;
-        p = p * f + 1.0 / 40320.0;
-        p = p * f + 1.0 / 5040.0;
-        p = p * f + 1.0 / 720.0;
-        p = p * f + 1.0 / 120.0;
-        p = p * f + 1.0 / 24.0;
-        p = p * f + 1.0 / 6.0;
-        p = p * f + 0.5;
-        p = p * f + 1.0;
-        p = p * f + 1.0;
-        const std::uint64_t exponent = (std::bit_cast<std::uint64_t>(shifted) + 1023) << 52;
-        values[i] = p * std::bit_cast<double>(exponent);
+    for (std::size_t i = 0; i < count; ++i) values[i] = exp_of(factor * values[i]);
+}
+
+THERMBAL_EVERY_WIDTH
+double weighted_gaussians(const double* __restrict centres, std::size_t count,
+                          const double* __restrict weight, const double* __restrict point, std::size_t lags,
+                          double factor) {
+    Lanes sums{};
+    for (std::size_t i = 0; i < count; i += lanes) {
+        Lanes distance{};
+        for (std::size_t l = 0; l < lags; ++l) {
+            const double* centre = centres + l * count + i;
+            for (std::size_t lane = 0; lane < lanes; ++lane) {
+                const double difference = centre[lane] - point[l];
+                distance[lane] += difference * difference;
+            }
+        }
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+            sums[lane] += weight[i + lane] * exp_of(std::max(factor * distance[lane], -700.0));
+        }
     }
+    return total(sums);
 }
 
 THERMBAL_EVERY_WIDTH

@@ -59,8 +59,8 @@ class SvrModel {
     std::size_t support_vectors_;
     double minus_inverse_sigma2_;
     double bias_;
-    std::vector<double> coefficients_;
-    std::vector<double> vectors_;  ///< one lag of all rows after the other
+    std::vector<double> coefficients_;  ///< padded with zeros, as the rows of vectors_
+    std::vector<double> vectors_;       ///< one lag of all rows after the other
 };
 
 }  // namespace thermbal

@@ -39,6 +39,11 @@ class TubeSolver {
     /// optimum.
     [[nodiscard]] bool fit(double C, const State& start, const Schedule& schedule);
 
+    /// The two halves of fit(): C and where to start from, then one smoothing after the other, each to where
+    /// a further step moves no prediction by more than 0.3 of it. False as fit().
+    void start(double C, const State& start);
+    [[nodiscard]] bool descend_to(double smoothing, int most_steps);
+
     const State& state() const { return state_; }
     /// alpha - alpha* of every row.
     const Eigen::VectorXd& coefficients() const { return slopes_; }
@@ -55,6 +60,7 @@ class TubeSolver {
     void newton_direction();
     void direction_in_feature_space(double curvature);
     void direction_in_row_space(double curvature);
+    Eigen::Ref<Eigen::MatrixXd> square_of(const Eigen::MatrixXd& vectors, Eigen::Index length);
     double step_length();
     void centre_undetermined_bias();
 
@@ -69,7 +75,8 @@ class TubeSolver {
     Eigen::VectorXd slopes_, new_slopes_;
     Eigen::VectorXd slope_sum_;          ///< sum of slopes_(i) * row i
     std::vector<Eigen::Index> bending_;  ///< rows where the loss is quadratic
-    Eigen::MatrixXd bent_;               ///< their features, one column a row
+    Eigen::MatrixXd bent_;               ///< their features, one column a row, padded with zeros
+    Eigen::MatrixXd by_feature_;         ///< bent_ transposed, padded likewise
     Eigen::MatrixXd square_;             ///< of the Newton system
     Eigen::VectorXd gradient_;
     double bias_gradient_ = 0.0;

@@ -7,6 +7,12 @@
 /// fused.
 namespace thermbal::vector_loops {
 
+inline constexpr std::size_t lane_count = 8;
+/// The next multiple of lane_count.
+constexpr std::size_t padded(std::size_t count) {
+    return (count + lane_count - 1) / lane_count * lane_count;
+}
+
 /// out[i] = constant + sum over columns k of factor[k] * matrix[i + k * rows].
 void multiply_columns(const double* matrix, std::size_t rows, std::size_t columns, const double* factor,
                       double constant, double* out);
@@ -22,8 +28,14 @@ void squared_distances_to(const double* const* lagged, std::size_t rows, const d
 /// values[i] = exp(factor * values[i]); factor * values[i] must lie in [-700, 0]. Error below 2e-16.
 void scaled_exp(double* values, std::size_t count, double factor);
 
+/// sum over i < count of weight[i] * exp(factor * |centre_i - point|^2), factor <= 0, lag l of centre i at
+/// centres[l * count + i]. REQUIRES: count % lane_count == 0.
+double weighted_gaussians(const double* centres, std::size_t count, const double* weight, const double* point,
+                          std::size_t lags, double factor);
+
 /// lower += sum over c < count of v_c v_c', v_c = vectors[c * length ...]: the lower triangle of a length x
-/// length matrix, column by column.
+/// length matrix, column by column; of what lies above, a part is written, too.
+/// REQUIRES: length % lane_count == 0.
 void add_outer_products(const double* vectors, std::size_t length, std::size_t count, double* lower);
 
 /// The epsilon-insensitive loss with its kink smoothed over `smoothing`: its slope is
