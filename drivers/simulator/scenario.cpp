@@ -66,12 +66,25 @@ class ScenarioReader {
     Result<std::string> kind_text(const toml::table& table) const {
         const auto kind = table["kind"].value<std::string>();
         if (!kind) return refuse(table, "kind is missing; accepted: the name of a fault");
-        std::string text = *kind;
-        if (const auto value = table["value"].value<double>()) text += fmt::format("={}", *value);
         if (table.contains("unit") && table.contains("channel"))
             return refuse(table, "both unit and channel");
-        if (const auto unit = table["unit"].value<std::int64_t>()) text += fmt::format(":{}", *unit);
-        if (const auto channel = table["channel"].value<std::string>()) text += ":" + *channel;
+        std::string text = *kind;
+        if (const toml::node* node = table.get("value")) {
+            const auto value = node->value<double>();
+            if (!value) return refuse(*node, "value; accepted: a number");
+            text += fmt::format("={}", *value);
+        }
+        if (const toml::node* node = table.get("unit")) {
+            // Exactly an integer: toml++ 3.1 converts 1e308 without looking.
+            const auto unit = node->value_exact<std::int64_t>();
+            if (!unit) return refuse(*node, "unit; accepted: a whole number");
+            text += fmt::format(":{}", *unit);
+        }
+        if (const toml::node* node = table.get("channel")) {
+            const auto channel = node->value<std::string>();
+            if (!channel) return refuse(*node, "channel; accepted: \"T1\" ... \"T16\"");
+            text += ":" + *channel;
+        }
         return text;
     }
 

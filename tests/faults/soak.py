@@ -46,6 +46,11 @@ def rows_of(arguments):
         work += [(transport, "mixture", ["--scans", scans]) for transport in arguments.transports]
     with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as pool:
         started = [pool.submit(row, transport, fault, arguments, flags) for transport, fault, flags in work]
+        rows = []
+        for done in concurrent.futures.as_completed(started):
+            rows.append(done.result())
+            if arguments.json:
+                pathlib.Path(arguments.json).write_text(json.dumps(rows, indent=1), encoding="utf-8")
         return [one.result() for one in started]
 
 
@@ -67,12 +72,12 @@ def main():
     parser.add_argument("--faults", nargs="*", help="only these")
     parser.add_argument("--limit-s", type=float, default=7200.0, help="a row that takes longer hangs")
     parser.add_argument("--scratch", help="where the databases are written, e.g. /dev/shm")
-    parser.add_argument("--json", help="write the rows to this file")
+    parser.add_argument("--json", help="write the rows to this file, each as soon as it is done")
+    parser.add_argument("--values-only", action="store_true",
+                        help="fail for wrong values and hangs only: on a busy host it is the host that is late")
     arguments = parser.parse_args()
     started = time.monotonic()
     rows = rows_of(arguments)
-    if arguments.json:
-        pathlib.Path(arguments.json).write_text(json.dumps(rows, indent=1), encoding="utf-8")
     print(table(rows))
     total = {key: sum(one[key] for one in rows) for key in ("injections", "scans", "good_values", *MUST_BE_ZERO)}
     frozen = max((one["longest_unnoticed_scans"] for one in rows), default=0)
@@ -80,7 +85,7 @@ def main():
           f"{total['wrong_values']} wrong, {total['hangs']} hangs, {total['late_scans']} late scans, "
           f"{total['late_recoveries']} recoveries later than the first scan; a frozen module is noticed after at most "
           f"{frozen} repeated scans; {time.monotonic() - started:.0f} s")
-    return 1 if any(total[key] for key in MUST_BE_ZERO) else 0
+    return 1 if any(total[key] for key in (MUST_BE_ZERO[:2] if arguments.values_only else MUST_BE_ZERO)) else 0
 
 
 if __name__ == "__main__":

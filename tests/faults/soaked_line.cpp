@@ -1,7 +1,9 @@
 #include "soaked_line.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
+#include <utility>
 
 #include "acquisition/clock.hpp"
 
@@ -46,7 +48,9 @@ std::vector<ChannelSample> SoakedLine::read_scan() {
         for (const Sample& sample : reading.samples) samples.push_back({samples.size(), sample});
     }
     facts_.took_s = static_cast<double>(real_monotonic_ns() - started_ns) * 1e-9;
-    facts_.host_stalled_s = stalls_.worst_s();
+    // What a stall held back may come during the scan after it.
+    const double stalled_s = stalls_.worst_s();
+    facts_.host_stalled_s = std::max(stalled_s, std::exchange(stalled_before_s_, stalled_s));
     facts_.clean = quiet && rig_.faults_begun() == faults_before;
     return samples;
 }

@@ -15,7 +15,7 @@ namespace thermbal::soak {
 struct ScanFacts {
     bool clean = false;           ///< it began after the fault had ended, and ended before the next one began
     double took_s = 0.0;          ///< real time
-    double host_stalled_s = 0.0;  ///< the longest that this process was kept from running meanwhile
+    double host_stalled_s = 0.0;  ///< by StallMeter, in this scan or the one before
     std::string error;            ///< of the first unit that failed
 };
 
@@ -40,6 +40,7 @@ class SoakedLine final : public Line {
     double bound_s_ = 0.0;
     std::int64_t scan_ = 0;
     StallMeter stalls_;
+    double stalled_before_s_ = 0.0;
     ScanFacts facts_;
 };
 

@@ -39,6 +39,10 @@ TEST(Scenario, WhatIsWrongIsNamedWithFileAndLine) {
         {"[[fault]]\nkind = \"late\"\nvalue = -3\nat_s = 0", "VALUE is a number from 0 to 3600"},
         {"[[fault]]\nkind = \"open\"\nunit = 1\nat_s = 0", "a sensor fault acts on T1"},
         {"[[fault]]\nkind = \"open\"\nunit = 1\nchannel = \"T1\"\nat_s = 0", "both unit and channel"},
+        {"[[fault]]\nkind = \"late\"\nunit = 1e308\nat_s = 0",
+         "night.toml:3: unit; accepted: a whole number"},
+        {"[[fault]]\nkind = \"late\"\nvalue = \"x\"\nat_s = 0", "value; accepted: a number"},
+        {"[[fault]]\nkind = \"open\"\nchannel = 7\nat_s = 0", "channel; accepted"},
         {"fault = 3", "night.toml:1: 'fault'; accepted: [[fault]] tables"},
         {"[[fault]", "night.toml:1: "},
     };
