@@ -149,6 +149,11 @@ Result<json> Daemon::status_json() const {
             {"reason", is_measuring(test_.state) ? test_.decision.reason : test_.end_reason},
             {"identified_at_min",
              test_.identified_scan ? json(test_.grid.time_s(*test_.identified_scan) / 60.0) : json(nullptr)},
+            {"identification_age_s",
+             test_.identified_scan
+                 ? json(test_.grid.time_s(std::max(test_.last_scan, *test_.identified_scan)) -
+                        test_.grid.time_s(*test_.identified_scan))
+                 : json(nullptr)},
             {"identification_s", test_.identification_s}};
     }
     return status;
@@ -183,6 +188,7 @@ Result<json> Daemon::channels_json() const {
             entry["equilibrium_time_min"] = number_or_null(verdict->equilibrium_time_min);
             entry["time_left_min"] = number_or_null(time_left_min(verdict->equilibrium_time_min, time_min));
             entry["reason"] = verdict->reason;
+            entry["identification_age_s"] = number_or_null((time_min - verdict->window_end_min) * 60.0);
         }
         list.push_back(std::move(entry));
     }
