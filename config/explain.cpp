@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -18,6 +19,11 @@ std::string explain_test(const TestConfig& test) {
         "[test]\nname = {}\nmachine = {}\nperiod_s = {}\n{}keep_measuring = {}\nstart = \"{}\"\n",
         quoted(test.name), quoted(test.machine), test.period_s, limit, test.keep_measuring,
         test.start == TestConfig::Start::manual ? "manual" : "auto");
+}
+
+/// 1.001 s is 1001 ms, not the 1000.9999999999999 of binary fractions.
+double milliseconds(double s) {
+    return std::round(s * 1e9) / 1e6;
 }
 
 std::string explain_serial(const LineConfig& line) {
@@ -48,10 +54,11 @@ std::string explain_line(const LineConfig& line) {
     } else {
         text += fmt::format("transport = \"{}\"\nhost = {}\nport = {}\nconnect_timeout_ms = {}\n",
                             link.transport == Transport::tcp ? "tcp" : "rtu_over_tcp", quoted(link.host),
-                            link.port, link.connect_timeout_s * 1000.0);
+                            link.port, milliseconds(link.connect_timeout_s));
     }
-    return text + fmt::format("response_timeout_ms = {}\nquiet_ms = {}\n", link.response_timeout_s * 1000.0,
-                              link.quiet_s * 1000.0);
+    return text + fmt::format("response_timeout_ms = {}\nquiet_ms = {}\nreconnect_pause_ms = {}\n",
+                              milliseconds(link.response_timeout_s), milliseconds(link.quiet_s),
+                              milliseconds(link.longest_pause_s));
 }
 
 std::string as_comment(const std::string& text) {

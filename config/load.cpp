@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <map>
 #include <utility>
 
@@ -189,6 +190,16 @@ class Loader {
         if (const auto ms = reader.number("response_timeout_ms", {1.0, 60'000.0}))
             link.response_timeout_s = *ms / 1000.0;
         if (const auto ms = reader.number("quiet_ms", {0.0, 1000.0})) link.quiet_s = *ms / 1000.0;
+        read_pause(reader, link);
+    }
+
+    /// The first scan after a fault has to find the line awake: a pause is over long before the next scan.
+    void read_pause(TableReader& reader, LinkOptions& link) {
+        const double period_ms = config_.test.period_s * 1000.0;
+        const double usual_ms = std::min(link.longest_pause_s * 1000.0, std::floor(period_ms / 4.0));
+        const auto ms = reader.number("reconnect_pause_ms", {0.0, period_ms});
+        link.longest_pause_s = ms.value_or(usual_ms) / 1000.0;
+        link.first_pause_s = std::min(link.first_pause_s, link.longest_pause_s);
     }
 
     /// Which of `index` the key names; the only one there is when the key is not given.

@@ -47,6 +47,27 @@ Config load(const std::string& head, const std::string& unit = "", const std::st
     return config.value_or(Config{});
 }
 
+TEST(Lines, APauseAfterAFailedOpeningIsOverBeforeTheNextScan) {
+    EXPECT_EQ(load("").lines[0].link.longest_pause_s, 2.0);
+    EXPECT_EQ(load("[test]\nperiod_s = 2.0\n").lines[0].link.longest_pause_s, 0.5);
+    const LinkOptions fast = load(
+                                 "[test]\nperiod_s = 0.2\n[identification]\nevery_s = 10.0\n"
+                                 "[[line]]\nname = \"fast\"\ntransport = \"tcp\"\nhost = \"h\"\n"
+                                 "response_timeout_ms = 20\nconnect_timeout_ms = 20\n",
+                                 "line = \"fast\"\n")
+                                 .lines[0]
+                                 .link;
+    EXPECT_EQ(fast.longest_pause_s, 0.05);
+    EXPECT_EQ(fast.first_pause_s, 0.05);
+    const Config config = load(
+        "[[line]]\nname = \"own\"\ntransport = \"tcp\"\nhost = \"h\"\n"
+        "response_timeout_ms = 1001\nreconnect_pause_ms = 30\n",
+        "line = \"own\"\n");
+    EXPECT_EQ(config.lines[0].link.longest_pause_s, 0.03);
+    EXPECT_THAT(explain_config(config), HasSubstr("response_timeout_ms = 1001\n"));
+    EXPECT_THAT(explain_config(config), HasSubstr("reconnect_pause_ms = 30\n"));
+}
+
 TEST(DefaultConfiguration, LoadsAndIsWhatTheHeaderSays) {
     const auto config = load_config_file(source_dir + "/config/thermbald.toml", shipped_profiles());
     ASSERT_TRUE(config) << config.error().message;
