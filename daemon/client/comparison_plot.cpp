@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <ranges>
 #include <string_view>
 #include <vector>
 
@@ -70,7 +71,7 @@ class Panel {
                      std::string_view style) const {
         std::string points;
         for (const Point& point : low) points += at(point) + " ";
-        for (auto point = high.rbegin(); point != high.rend(); ++point) points += at(*point) + " ";
+        for (const Point& point : std::views::reverse(high)) points += at(point) + " ";
         return low.empty() ? points : fmt::format("<polygon points=\"{}\" {}/>\n", points, style);
     }
 
@@ -178,8 +179,10 @@ std::string comparison_svg(const json& document) {
         width, height, width);
     svg += legend(document);
     for (std::size_t i = 0; i < panels; ++i) {
-        svg += panel_svg(document, document["channels"][i], static_cast<double>(i % columns) * panel_width,
-                         legend_height + static_cast<double>(i / columns) * panel_height);
+        const std::size_t row = i / columns;
+        svg +=
+            panel_svg(document, document["channels"][i], static_cast<double>(i - row * columns) * panel_width,
+                      legend_height + static_cast<double>(row) * panel_height);
     }
     return svg + "</svg>\n";
 }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <optional>
+#include <ranges>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -85,11 +85,11 @@ double earliest_honest_min(const FinishedTest& test, const MeasuredEnd& end,
                            const std::vector<IdentificationRecord>& identifications,
                            std::int64_t declared_scan, double tolerance_C) {
     double earliest_min = no_value;
-    for (auto record = identifications.rbegin(); record != identifications.rend(); ++record) {
-        if (record->window_end_scan > declared_scan) continue;
-        const auto verdict = verdict_from_json(json::parse(record->verdict_json, nullptr, false));
+    for (const IdentificationRecord& record : std::views::reverse(identifications)) {
+        if (record.window_end_scan > declared_scan) continue;
+        const auto verdict = verdict_from_json(json::parse(record.verdict_json, nullptr, false));
         if (!verdict) break;
-        const double at_min = test.minute_of(record->window_end_scan);
+        const double at_min = test.minute_of(record.window_end_scan);
         const double settles_C = end.settles_at_C(test.room_C(at_min));
         const bool right = std::abs(verdict->steady_state_C - settles_C) <= tolerance_C &&
                            verdict->steady_state_low_C <= settles_C &&
@@ -211,10 +211,10 @@ std::string document_text(const json& document) {
             return row[key].is_boolean() ? (row[key].get<bool>() ? "yes" : "no") : "-";
         };
         std::string remark = text(row, "does_not_count");
-        if (!remark.empty()) remark = "does not count: " + remark;
+        if (!remark.empty()) remark.insert(0, "does not count: ");
         if (row["wrong"] == true) remark = "wrong";
         if (const std::string why = text(row, "withdrawn"); !why.empty())
-            remark += (remark.empty() ? "withdrawn: " : "; withdrawn: ") + why;
+            remark.append(remark.empty() ? "withdrawn: " : "; withdrawn: ").append(why);
         table.add({std::to_string(row["test"].get<TestId>()), text(row, "machine"), text(row, "channel"),
                    fixed(number(row, "steady_state_C"), 2), minutes(number(row, "declared_at_min")),
                    fixed(number(row, "steady_state_low_C"), 2) + " .. " +
