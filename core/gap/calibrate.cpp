@@ -31,9 +31,9 @@ void state_sigmas(Model& model, const std::vector<CalibratedParameter>& paramete
     set_parameter_sigmas(model, sigmas);
 }
 
-/// The coordinates of a fit with the starts as the first readings are: what `simulate` computes.
-Eigen::VectorXd without_starts(const FitProblem& problem, Eigen::VectorXd coordinates) {
-    coordinates.tail(static_cast<Eigen::Index>(problem.data().starts.size())).setZero();
+/// The coordinates of a fit without what is not the model's: what `simulate` computes.
+Eigen::VectorXd model_alone(const FitProblem& problem, Eigen::VectorXd coordinates) {
+    coordinates.tail(problem.data().nuisances()).setZero();
     return coordinates;
 }
 
@@ -55,7 +55,7 @@ Result<Calibration> calibrate(const Model& model, const RecordedTest& test,
     if (!before) return std::unexpected(before.error());
     const auto fit = minimise(problem, {problem.prior_coordinates(), nullptr}, options);
     if (!fit) return std::unexpected(fit.error());
-    const auto after = problem.evaluate(without_starts(problem, fit->point.coordinates));
+    const auto after = problem.evaluate(model_alone(problem, fit->point.coordinates));
     if (!after) return std::unexpected(after.error());
     Calibration result;
     result.model = fit->model;

@@ -46,14 +46,14 @@ Eigen::VectorXd damped_step(const Eigen::MatrixXd& hessian, const Eigen::VectorX
 Result<Eigen::MatrixXd> jacobian_at(const FitProblem& problem, const FitPoint& point, const FitStart& start) {
     Eigen::MatrixXd jacobian(point.residual.size(), problem.dimensions());
     const auto base = start.known_jacobian == nullptr ? 0 : start.known_jacobian->cols();
-    const auto effects = problem.dimensions() - static_cast<Eigen::Index>(problem.data().starts.size());
-    const auto starts = static_cast<Eigen::Index>(problem.data().starts.size());
+    const Eigen::Index nuisances = problem.data().nuisances();
+    const Eigen::Index effects = problem.dimensions() - nuisances;
     const Eigen::Index samples = point.residual.size() - problem.dimensions();
     for (Eigen::Index i = 0; i < problem.dimensions(); ++i) {
-        // A known Jacobian has the parameters of the smaller model, then the starts; its rows end with as
+        // A known Jacobian has the parameters of the smaller model, then the nuisances; its rows end with as
         // many priors.
-        const Eigen::Index twin = i >= effects ? base - starts + (i - effects) : i;
-        if (start.known_jacobian != nullptr && (i >= effects || i < base - starts)) {
+        const Eigen::Index twin = i >= effects ? base - nuisances + (i - effects) : i;
+        if (start.known_jacobian != nullptr && (i >= effects || i < base - nuisances)) {
             jacobian.col(i).setZero();
             jacobian.col(i).head(samples) = start.known_jacobian->col(twin).head(samples);
             jacobian(samples + i, i) = (*start.known_jacobian)(samples + twin, twin);

@@ -24,6 +24,10 @@ struct FitData {
         double sigma_C;
     };
     std::vector<Start> starts;
+    double place_sigma = 0.0;  ///< ModelFidelity::place_share
+
+    /// Coordinates of a fit that are not the model's: the starts, then each column's place.
+    Eigen::Index nuisances() const { return static_cast<Eigen::Index>(starts.size() + seen.columns()); }
 };
 
 Result<FitData> make_fit_data(const Model& model, const RecordedTest& test,
@@ -61,9 +65,9 @@ class FitProblem {
     const std::vector<Parameter>& parameters() const { return parameters_; }
     const FitData& data() const { return *data_; }
     Eigen::Index dimensions() const {
-        return static_cast<Eigen::Index>(parameters_.size() + data_->starts.size());
+        return static_cast<Eigen::Index>(parameters_.size()) + data_->nuisances();
     }
-    /// The priors' centres, starts at zero.
+    /// The priors' centres, the rest at zero.
     Eigen::VectorXd prior_coordinates() const;
     Model model_at(const Eigen::VectorXd& coordinates) const;
     Result<FitPoint> evaluate(const Eigen::VectorXd& coordinates) const;
@@ -77,8 +81,9 @@ class FitProblem {
     Eigen::VectorXd upper() const;
 
   private:
-    /// Readings of the observed sensors at the bins; the last coordinates are the starts.
+    /// Readings of the observed sensors at the bins; the last coordinates are the nuisances.
     Simulated simulated(const Model& model, const Eigen::VectorXd& coordinates) const;
+    double nuisance_sigma(Eigen::Index nuisance) const;
     double step_of(Eigen::Index coordinate, const FitPoint& point) const;
 
     const FitData* data_;

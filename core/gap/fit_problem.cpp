@@ -43,7 +43,7 @@ Result<FitData> make_fit_data(const Model& model, const RecordedTest& test,
                               const CalibrationOptions& options) {
     auto seen = observe(model, test, bin_width_s(test, options.bin_s));
     if (!seen) return std::unexpected(seen.error());
-    FitData data{std::move(*seen), {}, {}};
+    FitData data{std::move(*seen), {}, {}, options.fidelity.place_share};
     data.whitening = Whitening(data.seen, options.fidelity);
     data.starts = starts_of(model, data.seen);
     return data;
@@ -72,15 +72,21 @@ Model FitProblem::model_at(const Eigen::VectorXd& coordinates) const {
 
 Simulated FitProblem::simulated(const Model& model, const Eigen::VectorXd& coordinates) const {
     Inputs inputs = data_->seen.inputs;
-    const auto starts = static_cast<Eigen::Index>(data_->starts.size());
-    for (Eigen::Index k = 0; k < starts; ++k) {
-        for (const std::size_t reading : data_->starts[static_cast<std::size_t>(k)].first_readings) {
-            inputs.first_readings[reading].value_C += coordinates(coordinates.size() - starts + k);
+    const auto nuisances = coordinates.tail(data_->nuisances());
+    for (std::size_t k = 0; k < data_->starts.size(); ++k) {
+        for (const std::size_t reading : data_->starts[k].first_readings) {
+            inputs.first_readings[reading].value_C += nuisances(static_cast<Eigen::Index>(k));
         }
     }
-    auto simulation = simulate(model, inputs, data_->seen.time_s);
+    const auto simulation = simulate(model, inputs, data_->seen.time_s);
     if (!simulation) return std::unexpected(simulation.error());
-    return Eigen::MatrixXd(simulation->reading_C(Eigen::all, data_->seen.sensors));
+    Eigen::MatrixXd readings_C = simulation->reading_C(Eigen::all, data_->seen.sensors);
+    const auto places = nuisances.tail(readings_C.cols());
+    for (Eigen::Index column = 0; column < readings_C.cols(); ++column) {
+        const double start_C = readings_C(0, column);
+        readings_C.col(column).array() += places(column) * (readings_C.col(column).array() - start_C);
+    }
+    return readings_C;
 }
 
 Simulated FitProblem::reading_change_by(const Fit& fit, const Effect& effect) const {
@@ -111,9 +117,7 @@ Result<FitPoint> FitProblem::evaluate(const Eigen::VectorXd& coordinates) const 
         const Parameter& parameter = parameters_[static_cast<std::size_t>(i)];
         priors(i) = parameter.prior_residual(parameter.to_value(coordinates(i)));
     }
-    for (Eigen::Index i = count; i < dimensions(); ++i) {
-        priors(i) = coordinates(i) / data_->starts[static_cast<std::size_t>(i - count)].sigma_C;
-    }
+    for (Eigen::Index i = count; i < dimensions(); ++i) priors(i) = coordinates(i) / nuisance_sigma(i - count);
     point.chi2 = point.residual.squaredNorm();
     return point;
 }
@@ -136,14 +140,24 @@ Eigen::VectorXd FitProblem::upper() const {
     return bound;
 }
 
+double FitProblem::nuisance_sigma(Eigen::Index nuisance) const {
+    const auto k = static_cast<std::size_t>(nuisance);
+    return k < data_->starts.size() ? data_->starts[k].sigma_C : data_->place_sigma;
+}
+
 /// Small against what the coordinate may do, large against the integrator's own error; across a bin for a
 /// moment of time, because between the samples nothing changes.
 double FitProblem::step_of(Eigen::Index coordinate, const FitPoint& point) const {
-    if (coordinate >= static_cast<Eigen::Index>(parameters_.size())) return 0.1;
+    const auto count = static_cast<Eigen::Index>(parameters_.size());
+    if (coordinate >= count) return nuisance_sigma(coordinate - count);
     const Parameter& p = parameters_[static_cast<std::size_t>(coordinate)];
     if (p.is_time) {
         const double step_s = 0.5 * data_->seen.bin_s;
         return p.logarithmic ? step_s / std::max(std::exp(point.coordinates(coordinate)), step_s) : step_s;
+    }
+    if (p.name.ends_with("period_s")) {  // many cycles long: a small change of the period moves the last one far
+        const double cycles = (data_->seen.time_s.back() - data_->seen.time_s.front()) / p.to_value(point.coordinates(coordinate));
+        return 0.05 / std::max(cycles, 1.0);
     }
     if (p.logarithmic) return 0.01;
     const double spread = std::isinf(p.prior_sigma) ? p.upper - p.lower : p.prior_sigma;

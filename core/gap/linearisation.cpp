@@ -6,7 +6,10 @@ Linearisation::Linearisation(const Fit& fit)
     : fit_(&fit),
       samples_(fit.jacobian.rows() - fit.jacobian.cols()),
       hessian_(fit.hessian()),
-      log_determinant_(hessian_.vectorD().array().abs().log().sum()) {}
+      log_determinant_(hessian_.vectorD().array().abs().log().sum()),
+      // A fit that stopped short of its optimum must not look like something missing.
+      residual_(fit.point.residual.head(samples_) -
+                fit.jacobian.topRows(samples_) * hessian_.solve(fit.jacobian.transpose() * fit.point.residual)) {}
 
 Eigen::MatrixXd Linearisation::project(const Eigen::MatrixXd& whitened) const {
     const auto sensitivities = fit_->jacobian.topRows(samples_);

@@ -24,8 +24,8 @@ class Linearisation {
     Gain gain_of(const Eigen::VectorXd& whitened_change) const;
 
     Eigen::Index samples() const { return samples_; }
-    /// Whitened residual, without the priors.
-    auto residual() const { return fit_->point.residual.head(samples_); }
+    /// Whitened residual at the optimum of the linearised fit, without the priors.
+    const Eigen::VectorXd& residual() const { return residual_; }
     double log_determinant() const { return log_determinant_; }
 
   private:
@@ -33,6 +33,7 @@ class Linearisation {
     Eigen::Index samples_;
     Eigen::LDLT<Eigen::MatrixXd> hessian_;
     double log_determinant_;
+    Eigen::VectorXd residual_;
 };
 
 }  // namespace thermbal

@@ -31,12 +31,30 @@ std::vector<double> grid_of(const EffectParameterDefinition& definition, const R
     return values;
 }
 
+/// A cycle of a known period may begin at any moment of it.
+std::vector<Effect> with_phases(const std::vector<Effect>& shapes) {
+    constexpr int phases = 8;
+    std::vector<Effect> result;
+    for (const Effect& shape : shapes) {
+        for (int k = 0; k < phases; ++k) {
+            result.push_back(shape);
+            result.back().parameters.push_back({"duty", 0.5, 0.0});
+            result.back().parameters.push_back({"first_on_s", -shape.parameter("period_s") * k / phases, 0.0});
+        }
+    }
+    return result;
+}
+
 /// Shapes to try: all combinations of the grids of every parameter but the first, which sizes the effect.
 std::vector<Effect> shapes_of(const Candidate& candidate, const Model& model, const Observation& seen,
                               const std::vector<double>& periods_s) {
     std::vector<Effect> shapes = {make_effect(*candidate.definition, *candidate.form, candidate.at, model)};
     for (std::size_t p = 1; p < candidate.form->parameters.size(); ++p) {
         const EffectParameterDefinition& definition = candidate.form->parameters[p];
+        if (definition.name == "first_on_s") {
+            shapes = with_phases(shapes);
+            continue;
+        }
         if (definition.when_absent) continue;
         const auto values = grid_of(definition, resolve_prior(definition, model), seen, periods_s);
         std::vector<Effect> wider;
@@ -87,7 +105,8 @@ Screened screen(const Candidate& candidate, const FitProblem& problem, const Fit
         const auto change = problem.change_by(fit, shape);
         if (!change) continue;
         const auto gain = linearisation.gain_of(*change);
-        if (prior.logarithmic && probe.relative && gain.amplitude <= 0.0) continue;
+        const bool one_sided = probe.relative && prior.lower >= 0.0;
+        if (one_sided && gain.amplitude <= 0.0) continue;
         if (gain.log_likelihood <= best.log_likelihood_gain) continue;
         best.log_likelihood_gain = gain.log_likelihood;
         best.start = shape;

@@ -1,0 +1,62 @@
+#include "odds.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace thermbal {
+namespace {
+
+double log_prior(const Candidate& candidate, const Model& model, const OddsOptions& options) {
+    const double kinds = static_cast<double>(effect_catalogue().size());
+    const double forms = static_cast<double>(candidate.definition->forms.size());
+    const double places = std::max<double>(1.0, static_cast<double>(possible_places(*candidate.form, model).size()));
+    return std::log(options.catalogue / kinds / forms / places);
+}
+
+}  // namespace
+
+Odds odds_of(const Survey& survey, const Model& model, const OddsOptions& options) {
+    double largest = std::log(options.nothing_missing);
+    std::vector<double> named, nameless;
+    for (const Contender& contender : survey.contenders) {
+        named.push_back(contender.log_bayes_factor + log_prior(contender.candidate, model, options));
+        largest = std::max(largest, named.back());
+    }
+    for (const Nameless& one : survey.nameless) {
+        const double worth = one.log_bayes_factor > 0.0 ? options.nameless_discount * one.log_bayes_factor : one.log_bayes_factor;
+        nameless.push_back(worth + std::log(options.nameless / static_cast<double>(survey.nameless.size())));
+        largest = std::max(largest, nameless.back());
+    }
+    Odds odds;
+    odds.nothing = std::exp(std::log(options.nothing_missing) - largest);
+    double total = odds.nothing;
+    for (const double weight : nameless) odds.nameless += std::exp(weight - largest);
+    total += odds.nameless;
+    for (std::size_t i = 0; i < survey.contenders.size(); ++i) {
+        const Candidate& candidate = survey.contenders[i].candidate;
+        const double weight = std::exp(named[i] - largest);
+        total += weight;
+        const auto known = std::ranges::find(odds.kinds, candidate.definition->kind, &Suspect::kind);
+        if (known != odds.kinds.end()) {
+            known->probability += weight;
+            continue;
+        }
+        odds.kinds.push_back(
+            {candidate.definition->kind, candidate.at, weight, survey.contenders[i].log_bayes_factor});
+        odds.best_of.push_back(i);
+    }
+    odds.nothing /= total;
+    odds.nameless /= total;
+    for (Suspect& suspect : odds.kinds) suspect.probability /= total;
+    std::vector<std::size_t> order(odds.kinds.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::ranges::sort(order, std::ranges::greater{}, [&](std::size_t i) { return odds.kinds[i].probability; });
+    Odds sorted{odds.nothing, odds.nameless, {}, {}};
+    for (const std::size_t i : order) {
+        sorted.kinds.push_back(odds.kinds[i]);
+        sorted.best_of.push_back(odds.best_of[i]);
+    }
+    return sorted;
+}
+
+}  // namespace thermbal
