@@ -94,7 +94,7 @@ class ScenarioReader {
         if (!table.contains(key)) return std::optional<double>();
         const auto value = table[key].value<double>();
         if (!value || !std::isfinite(*value) || *value < 0.0) return std::unexpected(false);
-        return std::optional(*value);
+        return value;
     }
 
     std::string_view file_name_;

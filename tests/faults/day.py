@@ -7,6 +7,7 @@ measured during that scan, no scan is missing or more than a period late, and th
 import argparse
 import bisect
 import csv
+import json
 import os
 import random
 import sys
@@ -20,15 +21,15 @@ PERIOD_NS = 15 * 10**9
 REPLY_FAULTS = ["silence", "late", "truncated", "trickle", "duplicate", "wrong-unit", "wrong-function", "wrong-length",
                 "wrong-count", "echo", "unsolicited", "noise", "exception", "hangup"]
 OF_THE_LINE = {"tcp": ["wrong-tid", "refuse", "half-open", "one-client"], "rtu": ["wrong-crc", "half-open", "unplug"]}
-SENSOR_FAULTS = ["open", "short", "code=0x7FFF", "code=-32768", "code=8501"]
+SENSOR_FAULTS = ["open", "short", "code"]
 
 
 def random_fault(rng, line, timeout_s):
     """KIND[=VALUE] and its target, as a table of the scenario says them."""
     kind = rng.choice(REPLY_FAULTS + OF_THE_LINE[line] + SENSOR_FAULTS)
     fault = {"kind": kind}
-    if kind.startswith("code"):
-        fault = {"kind": "code", "value": kind.split("=")[1]}
+    if kind == "code":
+        fault["value"] = rng.choice([0x7FFF, -32768, 8501, -2001])
     elif kind in ("late", "duplicate", "unsolicited", "one-client"):
         fault["value"] = round(rng.uniform(0.0, 3.0) * timeout_s, 4)
     elif kind == "trickle":
@@ -58,8 +59,7 @@ def scenario(path, line, hours, timeout_s, seed):
                 end_s = max(end_s, begins_s + lasts_s)
                 file.write("[[fault]]\n")
                 for key, value in fault.items():
-                    quoted = isinstance(value, str) and not value.startswith(("0x", "-"))
-                    file.write(f'{key} = "{value}"\n' if quoted else f"{key} = {value}\n")
+                    file.write(f"{key} = {json.dumps(value)}\n")
                 file.write(f"at_s = {begins_s:.3f}\nfor_s = {lasts_s:.3f}\n\n")
             intervals.append((at_s, end_s))
             at_s = end_s + rng.uniform(2, 12) * PERIOD_S

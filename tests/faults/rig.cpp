@@ -133,8 +133,8 @@ std::vector<Delivery> Rig::answer(Framing framing, const ModbusRequest& request,
 }
 
 std::vector<double> Rig::measured_C() const {
-    std::vector<double> values;
-    for (std::size_t c = 0; c < channels; ++c) values.push_back(plant_word(seed_, scan_, c) / 10.0);
+    std::vector<double> values(channels);
+    for (std::size_t c = 0; c < channels; ++c) values[c] = plant_word(seed_, scan_, c) / 10.0;
     return values;
 }
 

@@ -133,9 +133,13 @@ class Study {
         return options_.scans > 0 ? counts_.scans >= options_.scans : injector_.done() >= options_.times;
     }
 
+    /// False when the line hangs: no scan for so long, while the host would have let it run.
     bool wait_for_mail() const {
         pollfd mail{.fd = mailbox_.fd(), .events = POLLIN, .revents = 0};
-        return poll(&mail, 1, hang_ms) > 0;
+        while (poll(&mail, 1, hang_ms) == 0) {
+            if (line_.host_stalled_s() < hang_ms / 2000.0) return false;
+        }
+        return true;
     }
 
     void take(Scan& scan) {

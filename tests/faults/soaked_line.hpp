@@ -29,6 +29,8 @@ class SoakedLine final : public Line {
 
     /// Of the last scan; between its mail and the settling of its clock nobody else touches it.
     const ScanFacts& facts() const { return facts_; }
+    /// Since the last scan began. Any thread.
+    double host_stalled_s() const { return stalls_.worst_s(); }
     /// No scan takes longer, whatever the module does: the shortest period that a configuration may ask for.
     double bound_s() const { return bound_s_; }
 
