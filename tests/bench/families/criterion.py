@@ -1,13 +1,13 @@
 """Operating characteristic of the RMSE-against-n criterion: how often the clear minimum is there while the literal SVR's
 prediction is off, and how often while it is right, by window, on runs whose truth is known.
-Usage: criterion.py CORPUS --thermbalctl BIN [--every-min M] [--last-min M] [--channel T5]... [--limit-runs N] [--jobs N]
+Usage: criterion.py CORPUS --thermbalctl BIN [--every-min M] [--last-min M] [--channel T5]... [--limit-runs N] [--jobs N] [--rows FILE]
 Off: by more than --off-C, or no prediction at all (the free run does not settle). "stays": the minimum is clear at this
 window and at the one before. Live channels only, no window within 20 min after a change of inputs."""
 import argparse
 import json
 import tempfile
 from collections import defaultdict
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 from estimators import AFTER_CHANGE_MIN, compared, up_to
@@ -31,6 +31,11 @@ def judged(csv, truth, options, folder):
                 rows.append((at, clear, clear and before, off))
             before = clear
     return rows
+
+
+def kept_rows(path):
+    """Judged windows by run, from an earlier call."""
+    return dict(json.loads(line) for line in path.read_text().splitlines()) if path and path.exists() else {}
 
 
 def share(hits, of):
@@ -62,19 +67,24 @@ def main():
     parser.add_argument("--limit-runs", type=int)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--timeout-s", type=float, default=900.0)
-    parser.add_argument("--json", type=Path, help="every judged window")
+    parser.add_argument("--rows", type=Path, help="keep what is judged, a line of JSON a run; runs in it are not run again")
     options = parser.parse_args()
     options.channel = options.channel or ["T5"]
     options.estimator, options.window_min = ["svr"], [options.every_min]
-    runs = runs_of(options.corpus)[: options.limit_runs]
+    judged_runs = kept_rows(options.rows)
+    runs = [run for run in runs_of(options.corpus)[: options.limit_runs] if Path(run[0]).name not in judged_runs]
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(options.jobs) as pool:
-        rows = [row for found in pool.map(lambda run: judged(*run, options, folder), runs) for row in found]
-    if options.json:
-        options.json.write_text(json.dumps(rows))
+        waiting = {pool.submit(judged, *run, options, folder): Path(run[0]).name for run in runs}
+        for done in as_completed(waiting):
+            judged_runs[waiting[done]] = done.result()
+            if options.rows:
+                with options.rows.open("a") as kept:
+                    kept.write(json.dumps([waiting[done], done.result()]) + "\n")
+    rows = [row for found in judged_runs.values() for row in found]
     by_band = defaultdict(list)
     for row in rows:
         by_band[30 * int((row[0] - 1) // 30)].append(row)
-    print(f"{len(runs)} runs, channels {', '.join(options.channel)}, a window every {options.every_min} min; "
+    print(f"{len(judged_runs)} runs, channels {', '.join(options.channel)}, a window every {options.every_min} min; "
           f"off: by more than {options.off_C} C\n")
     print("| window, min | windows | SVR off | clear while off | clear while right | off while clear | off while it stays |")
     print("|---|---|---|---|---|---|---|")
