@@ -1,5 +1,6 @@
 #include <memory>
 
+#include "calibrate_command.hpp"
 #include "commands.hpp"
 #include "simulate_command.hpp"
 
@@ -8,9 +9,7 @@ namespace {
 
 constexpr char group[] = "On a simulation model";
 
-}  // namespace
-
-void add_model_commands(CLI::App& app, int& status) {
+void add_simulate(CLI::App& app, int& status) {
     const auto simulate = std::make_shared<SimulateCommand>();
     CLI::App& simulate_command = *app.add_subcommand("simulate", "what a model's sensors would read");
     simulate_command.group(group);
@@ -31,6 +30,26 @@ void add_model_commands(CLI::App& app, int& status) {
         ->required();
     simulate_command.add_flag("--nodes", simulate->nodes, "the nodes' temperatures, too, as columns NODE_C");
     simulate_command.callback([&status, simulate] { status = run_simulate(*simulate); });
+}
+
+void add_calibrate(CLI::App& app, int& status) {
+    const auto calibrate = std::make_shared<CalibrateCommand>();
+    CLI::App& calibrate_command = *app.add_subcommand(
+        "calibrate", "fit a model's numbers to a recorded test, and say how well each is known");
+    calibrate_command.group(group);
+    calibrate_command.add_option("FILE", calibrate->file, "recorded test: CSV")->required();
+    calibrate_command.add_option("--model", calibrate->model, "simulation model: TOML")->required();
+    calibrate_command.add_option("--write-model", calibrate->write_model,
+                                 "where the fitted model goes, with what is known now as its relative_sigma");
+    calibrate_command.add_flag("--json", calibrate->json, "one JSON document on standard output");
+    calibrate_command.callback([&status, calibrate] { status = run_calibrate(*calibrate); });
+}
+
+}  // namespace
+
+void add_model_commands(CLI::App& app, int& status) {
+    add_simulate(app, status);
+    add_calibrate(app, status);
 }
 
 }  // namespace thermbal

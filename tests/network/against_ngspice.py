@@ -69,6 +69,7 @@ run
 linearize v(read) v(hous)
 set wr_singlescale
 wrdata OUT v(read) v(hous)
+quit 0
 .endc
 .end
 """
