@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+#include "gap/diagnose.hpp"
+
+namespace thermbal {
+
+/// One sentence that needs no knowledge of the catalogue: what was missing, where, since when, how large,
+/// with the 90 % interval of its size.
+std::string effect_in_words(const FoundEffect& found);
+
+/// A diagnosis as one HTML file that needs nothing else: verdict in plain words, gap before and after for
+/// every run, the effects, the evidence of what else it might be, and per channel measured, before, after and
+/// the residuals.
+std::string gap_report_html(const Diagnosis& diagnosis);
+
+}  // namespace thermbal
