@@ -1,16 +1,17 @@
 #include "compute/earlier_tests.hpp"
 
+#include <cstdint>
+
 #include "report/spectrum_json.hpp"
 
 namespace thermbal {
 
 Result<MachinePrior> prior_of_machine(const Reader& database, std::string_view machine,
                                       const SpectrumOptions& spectrum, std::size_t most_tests) {
-    const auto records = database.archive(machine);
+    const auto records = database.archive(machine, static_cast<std::int64_t>(most_tests));
     if (!records) return std::unexpected(records.error());
     std::vector<ArchivedSpectrum> tests;
     for (const ArchiveRecord& record : *records) {
-        if (tests.size() == most_tests) break;
         auto read = spectrum_from_json(nlohmann::json::parse(record.spectrum_json, nullptr, false));
         if (!read) return std::unexpected(read.error());
         tests.push_back(std::move(*read));

@@ -393,12 +393,12 @@ Result<std::vector<EventRecord>> Reader::events(std::optional<TestId> id, std::i
     return events;
 }
 
-Result<std::vector<ArchiveRecord>> Reader::archive(std::string_view machine) const {
+Result<std::vector<ArchiveRecord>> Reader::archive(std::string_view machine, std::int64_t most) const {
     std::vector<ArchiveRecord> archive;
     auto rows = database_->query(
         "SELECT id, machine, test_id, created_wall_ns, spectrum FROM archive WHERE ?1 = '' OR machine = ?1 "
-        "ORDER BY id DESC",
-        machine);
+        "ORDER BY id DESC LIMIT ?2",
+        machine, most);
     while (rows.next())
         archive.push_back(
             {rows.integer(0), rows.text(1), rows.optional_integer(2), rows.integer(3), rows.text(4)});

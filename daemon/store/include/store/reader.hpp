@@ -58,8 +58,9 @@ class Reader {
     /// without one.
     Result<std::vector<EventRecord>> events(std::optional<TestId> id, std::int64_t after_id = 0,
                                             std::int64_t limit = 1000) const;
-    /// What earlier tests taught about a machine, newest first; of every machine with an empty name.
-    Result<std::vector<ArchiveRecord>> archive(std::string_view machine) const;
+    /// What earlier tests taught about a machine, newest first, at most `most` of them; of every machine with
+    /// an empty name.
+    Result<std::vector<ArchiveRecord>> archive(std::string_view machine, std::int64_t most = INT64_MAX) const;
 
     /// Empty when all is well: pages and constraints (integrity_check), references, the continuity of each
     /// test's grid, one sample a channel a scan, a value exactly where the quality is good, times that rise.
