@@ -11,7 +11,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)
 MAY = {
     "base": set(), "series": {"base"}, "filter": {"base", "series"}, "regression": {"base", "series"},
     "modes": {"base", "series"}, "declaration": {"base", "series", "filter", "regression", "modes"},
-    "network": {"base", "series"},
+    "network": {"base", "series"}, "gap": {"base", "series", "network"},
     "modbus": {"base", "series"}, "serial": {"base"}, "replay": {"base", "series"},
     "simulator": {"base", "series", "replay"},
 }
