@@ -31,6 +31,37 @@ TEST(VectorLoops, ExpIsThatOfTheStandardLibrary) {
     }
 }
 
+TEST(VectorLoops, GaussiansAreSummedAsByTheStandardLibrary) {
+    std::mt19937_64 random(2);
+    std::normal_distribution<double> normal;
+    constexpr std::size_t count = 16, lags = 3;
+    Numbers centres(count * lags), weights(count), point(lags);
+    for (Numbers* values : {&centres, &weights, &point})
+        std::ranges::generate(*values, [&] { return normal(random); });
+    for (const double factor : {-0.1, -3.0, -1e9}) {
+        double sum = 0.0;
+        for (std::size_t i = 0; i < count; ++i) {
+            double distance = 0.0;
+            for (std::size_t l = 0; l < lags; ++l) distance += std::pow(centres[l * count + i] - point[l], 2);
+            sum += weights[i] * std::exp(factor * distance);
+        }
+        EXPECT_NEAR(vector_loops::weighted_gaussians(centres.data(), count, weights.data(), point.data(),
+                                                     lags, factor),
+                    sum, 1e-14);
+    }
+}
+
+TEST(VectorLoops, OuterProductsAddUpInTheLowerTriangle) {
+    for (const Index length : {8, 16, 40}) {
+        const MatrixXd vectors = MatrixXd::Random(length, 11);
+        MatrixXd lower = MatrixXd::Ones(length, length);
+        vector_loops::add_outer_products(vectors.data(), static_cast<std::size_t>(length), 11, lower.data());
+        const MatrixXd expected = MatrixXd::Ones(length, length) + vectors * vectors.transpose();
+        const MatrixXd off = (lower - expected).triangularView<Eigen::Lower>();
+        EXPECT_LT(off.cwiseAbs().maxCoeff(), 1e-13);
+    }
+}
+
 TEST(VectorLoops, DerivativesAreThoseOfTheSmoothedLoss) {
     std::mt19937_64 random(1);
     std::normal_distribution<double> normal(0.0, 0.003);
@@ -229,6 +260,21 @@ TEST(LowRankSweep, ChoosesAsTheWholeGridByLibsvmDoes) {
             EXPECT_LT(at_ours - lowest, 1e-3);  // libsvm's default tolerance on the [0, 1] scale
             EXPECT_NEAR(std::sqrt(chosen->cv_mse_unit), at_ours, 1e-3 + 0.02 * at_ours);
         }
+    }
+}
+
+/// Too much for libsvm: C = 1024 on noise alone takes it minutes a fit.
+TEST(LowRankSweep, LosesNothingOnNoiseAloneAndOnCycles) {
+    const SweepOptions options;
+    Numbers cycling = testing::warm_up(testing::two_constants, 120);
+    for (std::size_t k = 0; k < cycling.size(); ++k)
+        cycling[k] += 0.4 * std::sin(0.157 * static_cast<double>(k));
+    for (const Numbers& window : {testing::filtered_warm_up({{0.0, 1.0}}, 120, 5), cycling}) {
+        const auto problem = *make_lag_problem(window, 9, 0.0);
+        const auto chosen = search_grid(problem, options, never_cancelled);
+        const auto errors = cross_validate_grid(problem, options, never_cancelled);
+        ASSERT_TRUE(chosen && errors);
+        EXPECT_NEAR(std::sqrt(chosen->cv_mse_unit), std::sqrt(*std::ranges::min_element(*errors)), 1e-4);
     }
 }
 
