@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "config/load.hpp"
 #include "toml_reader.hpp"
@@ -102,6 +103,19 @@ void read_map(TableReader& reader, ModuleProfile& profile) {
     set(profile.nan_quality, fault_quality(reader, "nan"));
 }
 
+TypeCode read_type_code(const toml::table& table, Complaints& complaints) {
+    TableReader reader(table, "type_code", complaints);
+    TypeCode code;
+    reader.require("first_register", "the register that holds the type of input 1");
+    reader.require("accepted", "a list: the codes of the sensors that this profile reads");
+    set(code.function, reader.integer("function", {3, 4}));
+    set(code.first_register, reader.integer("first_register", {0, 65535}));
+    set(code.stride, reader.integer("stride", {0, 65535}));
+    set(code.accepted, reader.integers("accepted", {0, 65535}));
+    reader.finish();
+    return code;
+}
+
 }  // namespace
 
 Result<ModuleProfile> load_profile(std::string_view toml, std::string_view file_name) {
@@ -111,6 +125,9 @@ Result<ModuleProfile> load_profile(std::string_view toml, std::string_view file_
     ModuleProfile profile;
     TableReader reader(*root, "", complaints);
     read_map(reader, profile);
+    if (const toml::table* table = reader.table("type_code")) {
+        profile.type_code = read_type_code(*table, complaints);
+    }
     for (const toml::table* table : reader.tables("fault")) {
         TableReader fault_reader(*table, "fault", complaints);
         if (const auto fault = read_fault(fault_reader, profile.type)) profile.faults.push_back(*fault);
@@ -132,6 +149,12 @@ std::string explain_profile(const ModuleProfile& profile) {
         quoted(profile.name), quoted(profile.source), profile.function, profile.first_register,
         profile.inputs, profile.stride, to_string(profile.type), to_string(profile.byte_order), profile.scale,
         profile.offset_C, profile.valid_min_C, profile.valid_max_C, to_string(profile.nan_quality));
+    if (profile.type_code) {
+        const TypeCode& code = *profile.type_code;
+        text +=
+            fmt::format("\n[type_code]\nfunction = {}\nfirst_register = {}\nstride = {}\naccepted = [{}]\n",
+                        code.function, code.first_register, code.stride, fmt::join(code.accepted, ", "));
+    }
     for (const FaultCode& fault : profile.faults) {
         text += fmt::format("\n[[fault]]\nfrom = {}\nto = {}\nquality = \"{}\"\n", fault.first, fault.last,
                             to_string(fault.quality));

@@ -151,6 +151,23 @@ std::optional<std::vector<std::string>> TableReader::texts(std::string_view key)
     return std::nullopt;
 }
 
+std::optional<std::vector<int>> TableReader::integers(std::string_view key, Range accepted) {
+    const toml::node* node = take(key);
+    if (node == nullptr) return std::nullopt;
+    std::vector<int> values;
+    if (const toml::array* array = node->as_array()) {
+        for (const toml::node& entry : *array) {
+            const auto value = entry.value_exact<std::int64_t>();
+            if (value && inside(static_cast<double>(*value), accepted))
+                values.push_back(static_cast<int>(*value));
+        }
+        if (values.size() == array->size()) return values;
+    }
+    complain(key, fmt::format("found {}; accepted: a list of whole numbers from {:.0f} to {:.0f}",
+                              shown(*node), accepted.low, accepted.high));
+    return std::nullopt;
+}
+
 std::optional<std::size_t> TableReader::choice(std::string_view key,
                                                std::initializer_list<std::string_view> choices) {
     const toml::node* node = take(key);

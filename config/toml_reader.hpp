@@ -56,6 +56,7 @@ class TableReader {
     /// An integer of any size, for register contents.
     std::optional<double> register_number(std::string_view key);
     std::optional<std::vector<std::string>> texts(std::string_view key);
+    std::optional<std::vector<int>> integers(std::string_view key, Range accepted);
     /// The position of the text in `choices`.
     std::optional<std::size_t> choice(std::string_view key, std::initializer_list<std::string_view> choices);
 

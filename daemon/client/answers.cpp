@@ -236,6 +236,38 @@ std::string event_message(const json& event) {
                                  names_channel ? "" : channel, message));
 }
 
+namespace {
+
+/// "  u0: round trips 12 up to 5 ms, 3 up to 10 ms; errors: 2 timeouts": what has happened, nothing else.
+std::string unit_details(const json& unit) {
+    std::string trips;
+    for (const json& bucket : list(unit, "round_trips")) {
+        const double count = number(bucket, "count").value_or(0.0);
+        if (count < 1.0) continue;
+        const auto bound = number(bucket, "up_to_ms");
+        trips += fmt::format("{}{} {}", trips.empty() ? "" : ", ", whole(count),
+                             bound ? fmt::format("up to {} ms", whole(*bound)) : std::string("longer"));
+    }
+    std::string errors;
+    for (const auto& [kind, count] : object_in(unit, "errors").items()) {
+        if (!count.is_number() || count.get<double>() < 1.0) continue;
+        std::string name = kind;
+        std::ranges::replace(name, '_', ' ');
+        errors +=
+            fmt::format("{}{} {}", errors.empty() ? "" : ", ", whole(count.get<double>()), printable(name));
+    }
+    std::string line;
+    if (!trips.empty()) line += " round trips: " + trips + ";";
+    if (!errors.empty()) line += " errors: " + errors + ";";
+    if (const std::string wrong = text(unit, "wrong_types"); !wrong.empty())
+        line += " TYPE CODES: " + wrong + ";";
+    if (line.empty()) return {};
+    line.pop_back();
+    return fmt::format("  {}:{}\n", text(unit, "unit"), line);
+}
+
+}  // namespace
+
 std::string health_text(const json& health) {
     const json& scans = object_in(health, "scans");
     Facts facts;
@@ -255,11 +287,16 @@ std::string health_text(const json& health) {
     facts.add("database", fmt::format("{}, log {}", bytes(number(health, "database_bytes")),
                                       bytes(number(health, "wal_bytes"))));
     if (number(health, "unstored_scans").value_or(0.0) > 0) {
-        facts.add("NOT STORED",
-                  whole(number(health, "unstored_scans")) + " scans wait in memory: see to the disk");
+        facts.add(
+            "NOT STORED",
+            fmt::format("{} of at most {} scans wait in memory: {}", whole(number(health, "unstored_scans")),
+                        whole(number(health, "unstored_scans_limit")), text(health, "storage_problem")));
     }
     if (number(health, "lost_scans").value_or(0.0) > 0)
         facts.add("LOST", whole(number(health, "lost_scans")) + " scans");
+    if (number(health, "refused_writes").value_or(0.0) > 0)
+        facts.add("REFUSED",
+                  whole(number(health, "refused_writes")) + " writes that the database contradicts");
     facts.add("processor", fixed(number(health, "cpu_s"), 1) + " s");
     facts.add("memory", bytes(number(health, "max_rss_bytes")) + " at most");
     facts.add("clients", whole(number(health, "clients")));
@@ -281,6 +318,7 @@ std::string health_text(const json& health) {
                        had_trouble ? or_dash(text(unit, "last_error")) : "-"});
         }
         whole_text += units.str();
+        for (const json& unit : list(line, "units")) whole_text += unit_details(unit);
     }
     return whole_text;
 }

@@ -13,6 +13,8 @@ void add_daemon_commands(CLI::App& app, int& status);
 void add_database_commands(CLI::App& app, int& status);
 /// identify, replay, compare, learn.
 void add_offline_commands(CLI::App& app, int& status);
+/// probe.
+void add_probe_command(CLI::App& app, int& status);
 /// simulate, calibrate.
 void add_model_commands(CLI::App& app, int& status);
 

@@ -85,8 +85,10 @@ Result<bool> is_damaged(const std::filesystem::path& database, int busy_timeout_
     file.read(header.data(), header.size());
     if (file.gcount() == 0) return false;
     const bool zeroed = std::all_of(header.begin(), header.end(), [](char c) { return c == 0; });
-    if (zeroed) return true;
-    if (std::memcmp(header.data(), "SQLite format 3", header.size()) != 0)
+    // A power cut while the file was made: its rollback journal says how to go back to an empty one.
+    const bool rolls_back = zeroed && std::filesystem::exists(database.string() + "-journal");
+    if (zeroed && !rolls_back) return true;
+    if (!rolls_back && std::memcmp(header.data(), "SQLite format 3", header.size()) != 0)
         return fail(NextStep::refuse_input,
                     fmt::format("database {}: not an SQLite database; name another file", database.string()));
 

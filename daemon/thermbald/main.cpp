@@ -67,6 +67,8 @@ void leave_signals_to_the_loop() {
     for (const int signal : {SIGTERM, SIGINT}) sigaddset(&signals, signal);
     pthread_sigmask(SIG_BLOCK, &signals, nullptr);
     std::signal(SIGPIPE, SIG_IGN);
+    // A limit on the size of files is a failed write, not the end of the measurement.
+    std::signal(SIGXFSZ, SIG_IGN);
 }
 
 /// An identification takes some megabytes for a second; without this, every thread keeps its own share of
@@ -93,7 +95,11 @@ int main(int argc, char** argv) {
     Flags flags;
     app.set_version_flag("--version", std::string("thermbald ") + version);
     app.add_option("--config", flags.config, "configuration file")->capture_default_str();
-    app.add_flag("--check-config", flags.check, "check the configuration, print what is in effect, and end");
+    std::string checked_file;
+    auto* check = app.add_option("--check-config", checked_file,
+                                 "check this configuration (without a file: that of --config), print what is in "
+                                 "effect, and end")
+                      ->expected(0, 1);
     app.add_option("--profiles", flags.profiles, "a further folder with module profiles, looked up first");
     app.add_flag("--exit-when-ended", flags.exit_when_ended,
                  "end when a test has ended (demonstrations, tests)");
@@ -109,6 +115,8 @@ int main(int argc, char** argv) {
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? 0 : 2;
     }
+    flags.check = check->count() > 0;
+    if (!checked_file.empty()) flags.config = checked_file;
 
     auto config = load_config_file(flags.config, profiles_in(profile_folders(flags)));
     if (!config) return refused(config.error());

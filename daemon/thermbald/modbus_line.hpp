@@ -11,6 +11,7 @@
 #include "config/config.hpp"
 #include "modbus/link.hpp"
 #include "modbus/unit.hpp"
+#include "statistics.hpp"
 
 namespace thermbal {
 
@@ -22,8 +23,11 @@ struct LineHealth {
         std::string name;
         bool answering = false;
         std::string last_error;
-        double round_trip_ms = 0.0;  ///< of the last scan
-        std::uint64_t failures = 0;  ///< scans without a trustworthy answer
+        double round_trip_ms = 0.0;      ///< of the last scan
+        std::uint64_t failures = 0;      ///< scans without a trustworthy answer
+        RoundTripHistogram round_trips;  ///< of the scans that were answered
+        LinkCounters errors;             ///< what of the line's counters this unit's scans added
+        std::string wrong_types;         ///< what the type codes contradict; empty: nothing
     };
     std::vector<Unit> units;
 };
@@ -52,9 +56,15 @@ class ModbusLine final : public Line {
     struct ConfiguredUnit {
         UnitPlan plan;
         std::vector<ConfiguredChannel> channels;
+        /// Read back when the unit (re)appears, and while they are wrong: who sets the module right need not
+        /// restart us.
+        enum class Types : std::uint8_t { unknown, right, wrong, unreadable };
+        Types types = Types::unknown;
+        std::vector<bool> input_is_wrong = {};
     };
 
-    void note(std::size_t unit, const UnitReading& reading);
+    void check_types(std::size_t unit, const UnitReading& reading);
+    void note(std::size_t unit, const UnitReading& reading, const LinkCounters& before);
 
     std::unique_ptr<Link> link_;
     std::vector<ConfiguredUnit> units_;

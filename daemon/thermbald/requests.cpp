@@ -2,7 +2,6 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include "daemon.hpp"
 #include "report/verdict_json.hpp"
@@ -37,14 +36,6 @@ json sample_json(const Sample& sample) {
             {"source_C", number_or_null(sample.source_C)},
             {"raw", sample.raw ? json(*sample.raw) : json(nullptr)},
             {"quality", to_string(sample.quality)}};
-}
-
-json figures_json(const RecentFigures& figures) {
-    return {{"count", figures.count()},
-            {"p50", figures.quantile(0.5)},
-            {"p99", figures.quantile(0.99)},
-            {"p999", figures.quantile(0.999)},
-            {"max", figures.maximum()}};
 }
 
 /// Least-squares slope of the newest good samples, in C per hour; NaN with fewer than two.
@@ -277,54 +268,6 @@ Result<json> Daemon::events_json(const json& params) const {
                         {"message", event.message}});
     }
     return json{{"events", std::move(list)}};
-}
-
-Result<json> Daemon::health_json() const {
-    json lines = json::array();
-    for (const auto& line : lines_) {
-        const LineHealth health = line->health();
-        json units = json::array();
-        for (const LineHealth::Unit& unit : health.units) {
-            units.push_back({{"unit", unit.name},
-                             {"answering", unit.answering},
-                             {"round_trip_ms", unit.round_trip_ms},
-                             {"failures", unit.failures},
-                             {"last_error", unit.last_error}});
-        }
-        lines.push_back({{"line", health.name},
-                         {"requests", health.counters.requests},
-                         {"replies", health.counters.replies},
-                         {"exceptions", health.counters.exceptions},
-                         {"timeouts", health.counters.timeouts},
-                         {"bad_frames", health.counters.bad_frames},
-                         {"stray_bytes", health.counters.stray_bytes},
-                         {"connects", health.counters.connects},
-                         {"connect_failures", health.counters.connect_failures},
-                         {"units", std::move(units)}});
-    }
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    const auto seconds = [](const timeval& time) {
-        return static_cast<double>(time.tv_sec) + static_cast<double>(time.tv_usec) * 1e-6;
-    };
-    const SocketServer::Counters counters = server_.counters();
-    return json{{"up_s", static_cast<double>(clock_.monotonic_ns() - started_ns_) * 1e-9},
-                {"scans", {{"ok", scans_ok_}, {"late", scans_late_}, {"missed", scans_missed_}}},
-                {"lateness_ms", figures_json(lateness_ms_)},
-                {"commit_ms", figures_json(commit_ms_)},
-                {"identification_s", figures_json(identification_s_)},
-                {"unstored_scans", storage_.unstored_scans()},
-                {"unstored_scans_limit", storage_.limits().scans},
-                {"unstored_writes", storage_.unstored_writes()},
-                {"refused_writes", storage_.refused_writes()},
-                {"lost_scans", storage_.lost_scans()},
-                {"storage_problem", storage_.problem()},
-                {"wal_bytes", storage_.store().wal_bytes()},
-                {"database_bytes", storage_.store().database_bytes()},
-                {"cpu_s", seconds(usage.ru_utime) + seconds(usage.ru_stime)},
-                {"max_rss_bytes", usage.ru_maxrss * 1024},
-                {"clients", counters.clients},
-                {"lines", std::move(lines)}};
 }
 
 Result<json> Daemon::on_start(const json& params) {

@@ -15,6 +15,11 @@ void RecentFigures::add(double value) {
     maximum_ = count_ == 1 ? value : std::max(maximum_, value);
 }
 
+void RoundTripHistogram::add(double round_trip_ms) {
+    const auto* const bucket = std::ranges::lower_bound(upper_ms, round_trip_ms);
+    ++counts_[static_cast<std::size_t>(bucket - upper_ms.begin())];
+}
+
 double RecentFigures::quantile(double q) const {
     if (kept_.empty()) return 0.0;
     std::vector<double> sorted = kept_;

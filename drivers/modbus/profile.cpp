@@ -146,6 +146,16 @@ std::string check_profile(const ModuleProfile& profile) {
                            profile.valid_min_C, profile.valid_max_C);
     }
     if (profile.nan_quality == Quality::good) return "nan_quality is good; a NaN is not a temperature";
+    if (profile.type_code) {
+        const TypeCode& code = *profile.type_code;
+        const long end =
+            static_cast<long>(code.first_register) + static_cast<long>(profile.inputs - 1) * code.stride;
+        if (code.accepted.empty()) return "type_code.accepted is empty; the codes of a PT100";
+        if (code.first_register < 0 || code.stride < 0 || end > 65535) {
+            return fmt::format("the type codes go from {} to {}; they have to lie in 0 to 65535",
+                               code.first_register, end);
+        }
+    }
     for (const FaultCode& fault : profile.faults) {
         if (!(fault.first <= fault.last)) {
             return fmt::format("a fault code from {} to {}; the lower number first", fault.first, fault.last);

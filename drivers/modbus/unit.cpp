@@ -4,6 +4,9 @@
 #include <span>
 #include <utility>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 namespace thermbal {
 namespace {
 
@@ -37,10 +40,53 @@ UnitPlan plan_unit(int unit_id, ModuleProfile profile) {
     return {.unit_id = unit_id, .profile = std::move(profile), .blocks = std::move(blocks)};
 }
 
+namespace {
+
+/// The type codes as if they were readings, so that the fewest reads cover them.
+ModuleProfile type_code_map(const ModuleProfile& profile) {
+    ModuleProfile map;
+    map.function = profile.type_code->function;
+    map.first_register = profile.type_code->first_register;
+    map.inputs = profile.type_code->stride == 0 ? 1 : profile.inputs;
+    map.stride = std::max(profile.type_code->stride, 1);
+    map.type = RegisterType::uint16;
+    return map;
+}
+
+}  // namespace
+
+Result<std::vector<std::uint16_t>> read_type_codes(Link& link, int unit_id, const ModuleProfile& profile) {
+    const ModuleProfile map = type_code_map(profile);
+    std::vector<std::uint16_t> codes;
+    for (const BlockRead& block : plan_blocks(map)) {
+        const auto words = link.read_block(unit_id, map.function, block.first, block.count);
+        if (!words) return std::unexpected(words.error());
+        for (int input = 0; input < block.inputs; ++input)
+            codes.push_back((*words)[static_cast<std::size_t>(input * map.stride)]);
+    }
+    codes.resize(static_cast<std::size_t>(profile.inputs), codes.back());
+    return codes;
+}
+
+std::string wrong_types(const ModuleProfile& profile, std::span<const std::uint16_t> codes) {
+    const std::vector<int>& accepted = profile.type_code->accepted;
+    std::string wrong;
+    for (std::size_t input = 0; input < codes.size(); ++input) {
+        if (std::ranges::find(accepted, static_cast<int>(codes[input])) != accepted.end()) continue;
+        wrong +=
+            fmt::format("{}input {} is set to type {}", wrong.empty() ? "" : ", ", input + 1, codes[input]);
+    }
+    if (!wrong.empty()) wrong += fmt::format("; the profile reads type {}", fmt::join(accepted, ", "));
+    return wrong;
+}
+
 double longest_unit_s(const LinkOptions& options, const UnitPlan& plan) {
     // Only one call can fail, and it is the last one: a block that succeeds takes no longer than an exchange.
-    const double exchange_s = options.response_timeout_s + options.quiet_s;
-    return longest_call_s(options) + static_cast<double>(plan.blocks.size() - 1) * exchange_s;
+    const double exchange_s =
+        (options.confirm_reads ? 2.0 : 1.0) * (options.response_timeout_s + options.quiet_s);
+    const std::size_t type_reads =
+        plan.profile.type_code ? plan_blocks(type_code_map(plan.profile)).size() : 0;
+    return longest_call_s(options) + static_cast<double>(plan.blocks.size() - 1 + type_reads) * exchange_s;
 }
 
 UnitReading read_unit(Link& link, const UnitPlan& plan, const ClockNs& now_ns) {

@@ -32,6 +32,14 @@ struct FaultCode {
     Quality quality = Quality::open;
 };
 
+/// Where a module says which kind of sensor an input is set to.
+struct TypeCode {
+    int function = 3;
+    int first_register = 0;     ///< of input 1
+    int stride = 1;             ///< registers from one input to the next; 0: one code for all inputs
+    std::vector<int> accepted;  ///< codes of the sensors that the profile reads rightly
+};
+
 /// The register map of one kind of temperature module: plain data, filled by the config room from TOML.
 /// Registers are counted from 0, as they go over the wire. value_C = number * scale + offset_C.
 struct ModuleProfile {
@@ -49,6 +57,7 @@ struct ModuleProfile {
     Quality nan_quality = Quality::open;  ///< what a float NaN means on this module
     double valid_min_C = -200.0;          ///< IEC 60751 unless the profile says less
     double valid_max_C = 850.0;
+    std::optional<TypeCode> type_code = {};  ///< empty: the module has none, or it is not published
 };
 
 inline constexpr int max_registers_per_read = 125;

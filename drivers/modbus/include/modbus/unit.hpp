@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "modbus/link.hpp"
@@ -40,6 +42,12 @@ struct UnitReading {
     std::int64_t request_ns = 0;  ///< the clock before the first request
     std::int64_t reply_ns = 0;    ///< the clock after the last reply, or after the failure
 };
+
+/// The type code of each input, as the module holds it now. REQUIRES: profile.type_code.
+Result<std::vector<std::uint16_t>> read_type_codes(Link& link, int unit_id, const ModuleProfile& profile);
+
+/// Which inputs are set to a sensor that the profile does not read, one sentence; empty when none is.
+std::string wrong_types(const ModuleProfile& profile, std::span<const std::uint16_t> codes);
 
 using ClockNs = std::function<std::int64_t()>;
 
