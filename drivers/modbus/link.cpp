@@ -111,7 +111,26 @@ class ModbusLink final : public Link {
         if (rtu_framing()) {
             if (auto settled = settle(request); !settled) return std::unexpected(std::move(settled.error()));
         }
-        return exchange(request);
+        auto reply = exchange(request);
+        const bool confirm = options_.confirm_reads && rtu_framing() && is_read(request);
+        return reply && confirm ? confirmed(request, std::move(reply)) : reply;
+    }
+
+    /// Hands the reply on when the unit's next answer is the one to what is asked next.
+    Result<Registers> confirmed(const Request& request, Result<Registers> reply) {
+        const auto answer = exchange(end_of(request));
+        if (answer || answer.error().next == NextStep::retry) return reply;
+        return fail(NextStep::reopen_link,
+                    fmt::format("unit {}: the reading is not used, the check behind it failed: {}",
+                                request.unit_id, answer.error().message));
+    }
+
+    /// The last value of a block, of 16 or 32 bits: another length than the block and than a probe.
+    static Request end_of(Request request) {
+        const int count = request.count_or_value;
+        request.count_or_value = count == 2 ? 1 : 2;
+        request.address = std::max(0, request.address + count - request.count_or_value);
+        return request;
     }
 
     /// An open line to the device that is plugged in now.
@@ -197,7 +216,8 @@ class ModbusLink final : public Link {
             ++(wire_.timed_out() ? counters_.timeouts : counters_.bad_frames);
             return in_doubt(request, std::move(reply.error()));
         }
-        if (rtu_framing() && wire_.readable(options_.quiet_s)) {
+        // TCP: what completes a truncated reply is the head of another frame, whose rest is there at once.
+        if (rtu_framing() ? wire_.readable(options_.quiet_s) : wire_.has_bytes()) {
             ++counters_.bad_frames;
             return in_doubt(request,
                             {.next = NextStep::reopen_link,

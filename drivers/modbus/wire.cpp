@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <modbus/modbus.h>
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <sys/select.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -242,6 +243,11 @@ bool Wire::readable(double wait_s) const {
         if (ready >= 0) return ready > 0;
         if (errno != EINTR) return true;
     }
+}
+
+bool Wire::has_bytes() const {
+    int count = 0;
+    return ioctl(modbus_get_socket(context_->modbus), FIONREAD, &count) == 0 && count > 0;
 }
 
 std::optional<std::size_t> Wire::discard() {

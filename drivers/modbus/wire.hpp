@@ -42,6 +42,9 @@ class Wire {
     /// Bytes arrive within `wait_s`, or the other side has closed.
     bool readable(double wait_s) const;
 
+    /// Bytes are there now; the end of a connection is none.
+    bool has_bytes() const;
+
     /// Reads away what is there now; empty when the other side has closed the line.
     std::optional<std::size_t> discard();
 

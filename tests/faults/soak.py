@@ -30,7 +30,8 @@ def faults_of(transport):
 def row(transport, fault, arguments, flags):
     with tempfile.TemporaryDirectory(prefix="thermbal-soak-", dir=arguments.scratch) as folder:
         done = subprocess.run([SOAK, "--transport", transport, "--fault", fault, "--folder", folder,
-                               "--seed", str(arguments.seed), "--response-timeout-ms", str(arguments.timeout_ms), *flags],
+                               "--seed", str(arguments.seed), "--response-timeout-ms", str(arguments.timeout_ms),
+                               *(["--confirm"] if arguments.confirm else []), *flags],
                               capture_output=True, text=True, timeout=arguments.limit_s, check=False)
     sys.stderr.write(done.stderr)
     if not done.stdout:
@@ -67,6 +68,7 @@ def main():
     parser.add_argument("--hours", type=float, default=24.0, help="accelerated hours of the random mixture")
     parser.add_argument("--jobs", type=int, default=6, help="rows at a time: most of a row is waiting for timeouts")
     parser.add_argument("--timeout-ms", type=float, default=50.0, help="response timeout of the link")
+    parser.add_argument("--confirm", action="store_true", help="with LinkOptions::confirm_reads")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--transports", nargs="*", default=["tcp", "rtu"])
     parser.add_argument("--faults", nargs="*", help="only these")

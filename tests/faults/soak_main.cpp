@@ -29,6 +29,7 @@ struct Options {
     double response_timeout_ms = 50.0;
     std::uint64_t seed = 1;
     std::string folder;
+    bool confirm = false;
     bool list = false;
 };
 
@@ -98,7 +99,7 @@ class Study {
     Study(const Options& options, Transport transport, std::vector<FaultDraw> draws)
         : options_(options),
           rig_(transport, options.seed),
-          line_(rig_, rig_.link_options(options.response_timeout_ms / 1000.0)),
+          line_(rig_, link_options(options)),
           injector_(rig_, std::move(draws), options.response_timeout_ms / 1000.0, options.seed),
           clock_(lockstep_clock(0, period_ns)),
           store_(or_exit(Store::open(options.folder + "/soak.db", {period_ns, 0}))),
@@ -129,6 +130,12 @@ class Study {
     double bound_s() const { return line_.bound_s(); }
 
   private:
+    LinkOptions link_options(const Options& options) const {
+        LinkOptions link = rig_.link_options(options.response_timeout_ms / 1000.0);
+        link.confirm_reads = options.confirm;
+        return link;
+    }
+
     bool enough() const {
         return options_.scans > 0 ? counts_.scans >= options_.scans : injector_.done() >= options_.times;
     }
@@ -283,6 +290,7 @@ int main(int argc, char** argv) {
     app.add_option("--response-timeout-ms", options.response_timeout_ms)->capture_default_str();
     app.add_option("--seed", options.seed)->capture_default_str();
     app.add_option("--folder", options.folder, "an empty one, for the database");
+    app.add_flag("--confirm", options.confirm, "LinkOptions::confirm_reads");
     app.add_flag("--list", options.list, "the faults of the transport");
     CLI11_PARSE(app, argc, argv);
     return thermbal::soak::run(options);

@@ -32,6 +32,11 @@ struct LinkOptions {
     double connect_timeout_s = 1.0;  ///< name resolution and connection together
     double quiet_s = 0.02;           ///< rtu: silence asked for before a request and after a reply
 
+    /// rtu framing: every block that was read is followed by a read of its last registers. A unit answers in
+    /// order, so when that is answered next, nothing else was under way: a sound frame that nobody asked for,
+    /// arriving just before a reply that is late, is then no reading. Costs one short exchange a block.
+    bool confirm_reads = false;
+
     /// After an opening that failed, calls fail at once for a while: doubling from the first to the longest
     /// pause, with jitter. Shorter than the time between two scans, or the first one after a fault is lost.
     double first_pause_s = 0.1;
