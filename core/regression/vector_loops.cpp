@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__)
@@ -104,9 +105,13 @@ void add_outer_products(const double* __restrict vectors, std::size_t length, st
             std::array<Lanes, block_columns> sums{};
             for (std::size_t v = 0; v < count; ++v) {
                 const double* vector = vectors + v * length;
+                // Copied, not read in place: g++ 12 reads eight where four are meant, past the last vector's
+                // end.
+                std::array<double, block_columns> factor;
+                std::memcpy(factor.data(), vector + j, sizeof factor);
                 for (std::size_t c = 0; c < block_columns; ++c) {
                     for (std::size_t lane = 0; lane < lanes; ++lane) {
-                        sums[c][lane] += vector[j + c] * vector[i + lane];
+                        sums[c][lane] += factor[c] * vector[i + lane];
                     }
                 }
             }

@@ -1,0 +1,65 @@
+#include <cstddef>
+#include <cstring>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "regression/vector_loops.hpp"
+
+namespace thermbal::test {
+namespace {
+
+/// Numbers that end where a page begins that nobody may touch: reading or writing one further is a
+/// segmentation fault. AddressSanitizer sees none of it, because under it the loops are not compiled for wide
+/// vectors.
+class AtTheEdge {
+  public:
+    explicit AtTheEdge(std::size_t count) {
+        const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
+        const std::size_t bytes = count * sizeof(double);
+        const std::size_t pages = (bytes + page - 1) / page;
+        length_ = (pages + 1) * page;
+        mapped_ = mmap(nullptr, length_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+        if (mapped_ == MAP_FAILED) std::abort();
+        auto* const bytes_mapped = static_cast<std::byte*>(mapped_);
+        if (mprotect(bytes_mapped + pages * page, page, PROT_NONE) != 0) std::abort();
+        data_ = reinterpret_cast<double*>(bytes_mapped + pages * page - bytes);
+        for (std::size_t i = 0; i < count; ++i) data_[i] = 0.25 + 0.001 * static_cast<double>(i % 97);
+    }
+    ~AtTheEdge() { munmap(mapped_, length_); }
+    AtTheEdge(const AtTheEdge&) = delete;
+    AtTheEdge& operator=(const AtTheEdge&) = delete;
+
+    double* data() { return data_; }
+
+  private:
+    void* mapped_ = nullptr;
+    std::size_t length_ = 0;
+    double* data_ = nullptr;
+};
+
+TEST(VectorLoops, ReadAndWriteNothingBeyondTheirArrays) {
+    for (const std::size_t rows : {8, 16, 24, 40, 64, 128}) {
+        for (const std::size_t count : {1, 2, 3, 4, 5, 7, 8, 13, 35, 90}) {
+            AtTheEdge matrix(rows * count), square(rows * rows), column(rows), weight(rows), lags(count);
+            vector_loops::add_outer_products(matrix.data(), rows, count, square.data());
+            vector_loops::multiply_columns(matrix.data(), rows, count, lags.data(), 0.5, column.data());
+            vector_loops::subtract_columns(matrix.data(), rows, count, lags.data(), column.data());
+            std::vector<const double*> lagged;
+            for (std::size_t l = 0; l < count; ++l) lagged.push_back(matrix.data() + l * rows);
+            vector_loops::squared_distances_to(lagged.data(), rows, lags.data(), count, column.data());
+            (void)vector_loops::weighted_gaussians(matrix.data(), rows, weight.data(), lags.data(), count,
+                                                   -0.5);
+            const vector_loops::Tube tube{};
+            AtTheEdge some(count), other(count);
+            vector_loops::scaled_exp(some.data(), count, -1.0);
+            vector_loops::loss_slopes(some.data(), count, tube, other.data());
+            (void)vector_loops::derivatives_along(some.data(), other.data(), 0.1, count, tube);
+        }
+    }
+}
+
+}  // namespace
+}  // namespace thermbal::test
