@@ -119,14 +119,17 @@ Guard enough_samples(const Evidence& evidence, const GuardOptions& options) {
                     100.0 * share, options.shortest_window_min, 100.0 * options.good_share)};
 }
 
+/// What a channel that rises by tens of kelvin must be known to is a share of its rise, not 0.2 C.
+double tolerance_of(const ChannelEstimate& now, const FlowOptions& options) {
+    return std::max(options.tolerance_C, options.tolerance_share_of_rise * std::abs(now.rise_C));
+}
+
 Guard interval_within_tolerance(const ChannelEstimate& now, const FlowOptions& options) {
-    // A skewed posterior can have a narrow 90 % and a long tail: the wider of the two counts.
-    constexpr double sds_of_90_percent = 1.645;
-    const double half_C = std::max(0.5 * (now.steady_state_high_C - now.steady_state_low_C),
-                                   sds_of_90_percent * now.steady_state_sd_C);
-    return {"interval_within_tolerance", half_C <= options.tolerance_C,
+    const double half_C = 0.5 * (now.steady_state_high_C - now.steady_state_low_C);
+    const double allowed_C = tolerance_of(now, options);
+    return {"interval_within_tolerance", half_C <= allowed_C,
             fmt::format("settles at {:.2f} C within +-{:.2f} C at 90 % (needed +-{:.2f} C)",
-                        now.steady_state_C, half_C, options.tolerance_C)};
+                        now.steady_state_C, half_C, allowed_C)};
 }
 
 Guard stable_over_windows(const ChannelEstimate& now, const Evidence& evidence, const FlowOptions& options) {
@@ -139,7 +142,7 @@ Guard stable_over_windows(const ChannelEstimate& now, const Evidence& evidence, 
         high_C = std::max(high_C, before->steady_state_C);
         ++seen;
     }
-    const double allowed_C = options.guards.drift_in_tolerances * options.tolerance_C;
+    const double allowed_C = options.guards.drift_in_tolerances * tolerance_of(now, options);
     return {"stable_over_windows", seen == 2 && high_C - low_C <= allowed_C,
             seen < 2
                 ? std::string("no earlier windows to compare with yet")
@@ -149,11 +152,15 @@ Guard stable_over_windows(const ChannelEstimate& now, const Evidence& evidence, 
 
 Guard slowest_seen_long_enough(const ChannelEstimate& now, const Evidence& evidence,
                                const GuardOptions& options) {
+    // A channel that rises little may hide its share of the machine's slowest mode in the noise.
+    const double slowest_min =
+        std::max(now.slowest_time_constant_min,
+                 options.share_of_machines_slowest * evidence.now->slowest_time_constant_min);
     const double seen_min = (evidence.window.end_s() - evidence.window.start_s) / 60.0;
-    const double needed_min = options.slow_time_constants * now.slowest_time_constant_min;
+    const double needed_min = options.slow_time_constants * slowest_min;
     return {"slowest_seen_long_enough", seen_min >= needed_min,
             fmt::format("{:.0f} min seen, slowest time constant {:.0f} min (needed {:.0f} min)", seen_min,
-                        now.slowest_time_constant_min, needed_min)};
+                        slowest_min, needed_min)};
 }
 
 /// A sensor far from the heat goes its way late: while most of it is still to come, its slow share is the

@@ -91,11 +91,11 @@ Eigen::VectorXd steady_state_functional(const Basis& basis, const AmbientInput& 
 }
 
 /// Quantile of an equal mixture of normals, by bisection.
-double mixture_quantile(const ChannelDraws& draws, double widening, double probability) {
+double mixture_quantile(const ChannelDraws& draws, double probability) {
     double low = draws.mean.front();
     double high = low;
     for (std::size_t k = 0; k < draws.mean.size(); ++k) {
-        const double reach = 8.0 * widening * std::sqrt(draws.variance[k]) + 1e-9;
+        const double reach = 8.0 * std::sqrt(draws.variance[k]) + 1e-9;
         low = std::min(low, draws.mean[k] - reach);
         high = std::max(high, draws.mean[k] + reach);
     }
@@ -103,7 +103,7 @@ double mixture_quantile(const ChannelDraws& draws, double widening, double proba
         const double middle = 0.5 * (low + high);
         double below = 0.0;
         for (std::size_t k = 0; k < draws.mean.size(); ++k) {
-            const double sd = widening * std::sqrt(draws.variance[k]) + 1e-12;
+            const double sd = std::sqrt(draws.variance[k]) + 1e-12;
             below += 0.5 * std::erfc((draws.mean[k] - middle) / (sd * std::sqrt(2.0)));
         }
         (below / static_cast<double>(draws.mean.size()) < probability ? low : high) = middle;
@@ -460,6 +460,7 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
         }
     }
 
+    const double factor = prior || !start_level_C.empty() ? 1.0 : options.interval_factor;
     SpectrumEstimate estimate;
     estimate.time_constant_min = fine_grid;
     estimate.background_time_constant_min = basis.time_constant_min;
@@ -493,17 +494,20 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
         double second = 0.0;
         for (std::size_t d = 0; d < channel_draws.mean.size(); ++d) {
             mean += channel_draws.mean[d];
-            second += channel_draws.mean[d] * channel_draws.mean[d] +
-                      options.interval_widening * options.interval_widening * channel_draws.variance[d];
+            second += channel_draws.mean[d] * channel_draws.mean[d] + channel_draws.variance[d];
         }
         const auto count = static_cast<double>(channel_draws.mean.size());
         mean /= count;
         channel.steady_state_C = data.centre_C + mean;
-        channel.steady_state_sd_C = std::sqrt(std::max(0.0, second / count - mean * mean));
-        channel.steady_state_low_C =
-            data.centre_C + mixture_quantile(channel_draws, options.interval_widening, 0.05);
-        channel.steady_state_high_C =
-            data.centre_C + mixture_quantile(channel_draws, options.interval_widening, 0.95);
+        // A skewed posterior can have a narrow 90 % and a long tail: the wider of the two counts.
+        constexpr double sds_of_90_percent = 1.645;
+        const double sd = std::sqrt(std::max(0.0, second / count - mean * mean));
+        const double quantiles_apart =
+            mixture_quantile(channel_draws, 0.95) - mixture_quantile(channel_draws, 0.05);
+        const double half = factor * std::max(0.5 * quantiles_apart, sds_of_90_percent * sd);
+        channel.steady_state_sd_C = factor * sd;
+        channel.steady_state_low_C = channel.steady_state_C - half;
+        channel.steady_state_high_C = channel.steady_state_C + half;
         const Eigen::VectorXd curve =
             linear_curves[k] * channel_draws.background + curves.fine * channel_draws.fine;
         Eigen::VectorXd coefficients(basis.size() + channel_draws.fine.size());

@@ -30,11 +30,12 @@ struct GuardOptions {
     double room_step_C = 0.3;           ///< how far the room may be from where it was some minutes ago ...
     double room_step_over_usual = 1.5;  ///< ... or this many times what is usual in this room
     double good_share = 0.8;            ///< of a channel's samples in the window
-    double look_back_min = 4.0;  ///< "stable": the window, one this much shorter, and one twice as much
-    double drift_in_tolerances = 0.75;  ///< how far the prediction may move over both
-    double slow_time_constants = 1.0;   ///< of the slowest supported time constant that must have been seen
-    double share_of_rise = 0.65;        ///< of its way to the steady state that a channel must have gone
-    double svr_agreement_C = 0.0;       ///< 0: the SVR's steady state is reported, it has no veto
+    double look_back_min = 4.0;        ///< "stable": the window, one this much shorter, and one twice as much
+    double drift_in_tolerances = 1.0;  ///< how far the prediction may move over both
+    double slow_time_constants = 1.0;  ///< of the slowest supported time constant that must have been seen
+    double share_of_machines_slowest = 0.7;  ///< of the slowest time constant of all channels, for each
+    double share_of_rise = 0.6;              ///< of its way to the steady state that a channel must have gone
+    double svr_agreement_C = 0.0;            ///< 0: the SVR's steady state is reported, it has no veto
     double overshoot_C = 0.5;  ///< how far a settling channel may be predicted back below where it is
     double barely_rise_in_tolerances = 1.0;
     double stuck_min = 20.0;    ///< the very same reading for so long or longer ...
@@ -50,7 +51,9 @@ enum class SweepWhen {
 
 struct FlowOptions {
     std::string ambient = "T1";  ///< the channel that measures the room; empty: none
-    double tolerance_C = 0.2;    ///< half width that the 90 % interval of a declaration may have
+    double tolerance_C = 0.2;    ///< half width that the 90 % interval of a declaration may have ...
+    double tolerance_share_of_rise =
+        0.025;  ///< ... or this share of the channel's whole rise, if that is more
     OutlierOptions outliers;
     GapOptions gaps;
     DenoiseOptions filter;
