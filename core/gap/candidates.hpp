@@ -9,6 +9,8 @@
 
 namespace thermbal {
 
+class ScreeningGround;
+
 /// One effect of the catalogue at one place.
 struct Candidate {
     const EffectDefinition* definition = nullptr;
@@ -29,7 +31,7 @@ struct Screened {
 
 /// Tries the candidate with its shape (onset, period, decay ...) on a grid, its size solved for at each.
 /// `periods_s`: what the residual itself repeats with.
-Screened screen(const Candidate& candidate, const FitProblem& problem, const Fit& fit,
-                const Linearisation& linearisation, const std::vector<double>& periods_s);
+Screened screen(const Candidate& candidate, const ScreeningGround& ground,
+                const std::vector<double>& periods_s);
 
 }  // namespace thermbal

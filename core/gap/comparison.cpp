@@ -45,7 +45,8 @@ Result<Eigen::MatrixXd> readings_of(const Model& model, const RecordedTest& test
 }
 
 Eigen::MatrixXd measured_of(const RecordedTest& test, const std::vector<std::string>& channels) {
-    Eigen::MatrixXd measured_C(static_cast<Eigen::Index>(test.time_s.size()), static_cast<Eigen::Index>(channels.size()));
+    Eigen::MatrixXd measured_C(static_cast<Eigen::Index>(test.time_s.size()),
+                               static_cast<Eigen::Index>(channels.size()));
     for (std::size_t c = 0; c < channels.size(); ++c) {
         const Column& column = *std::ranges::find(test.channels, channels[c], &Column::name);
         for (std::size_t row = 0; row < column.values.size(); ++row) {

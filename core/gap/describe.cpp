@@ -10,9 +10,13 @@
 namespace thermbal {
 namespace {
 
+/// A name that stands for something it does not describe well is never more than a suspicion.
+constexpr double relative_low = 0.25, relative_high = 0.40;
+
 std::string place_of(const Effect& effect, const Model& model) {
     const EffectSite site = find_effect(effect.kind)->form_of(effect).site;
-    if (site == EffectSite::whole_model || site == EffectSite::column) return effect.kind == "spindle_stop" ? "all" : "ambient";
+    if (site == EffectSite::whole_model || site == EffectSite::column)
+        return effect.kind == "spindle_stop" ? "all" : "ambient";
     if (site == EffectSite::source) return model.sources[*find_source(model, effect.at)].node;
     return effect.at;
 }
@@ -51,7 +55,8 @@ std::vector<std::string> channels_changed(const FitProblem& problem, const Fit& 
     std::vector<std::string> channels;
     for (std::size_t c = 0; c < seen.columns(); ++c) {
         const auto k = static_cast<Eigen::Index>(c);
-        if (largest_C(k) > std::max(seen.scan_sigma_C(k), 0.3 * largest_C.maxCoeff())) channels.push_back(seen.channels[c]);
+        if (largest_C(k) > std::max(seen.scan_sigma_C(k), 0.3 * largest_C.maxCoeff()))
+            channels.push_back(seen.channels[c]);
     }
     return channels;
 }
@@ -97,6 +102,8 @@ Result<std::vector<FoundEffect>> describe_effects(const Evidence& evidence, cons
                 one.alternatives.push_back(suspect);
             }
         }
+        if (search.steps[k].doubtful)
+            one.probability = std::clamp(one.probability, relative_low, relative_high);
         one.effect.provenance = {options.found_on, one.probability, ""};
         for (std::size_t p = 0; p < one.effect.parameters.size() && p < one.parameters.size(); ++p) {
             one.effect.parameters[p].sigma = one.parameters[p].sigma;

@@ -16,7 +16,8 @@ namespace {
 std::vector<std::string> channels_without_sensor(const Model& model, const RecordedTest& test) {
     std::vector<std::string> names;
     for (const Column& channel : test.channels) {
-        if (!find_sensor(model, channel.name) && channel.name != model.ambient.column) names.push_back(channel.name);
+        if (!find_sensor(model, channel.name) && channel.name != model.ambient.column)
+            names.push_back(channel.name);
     }
     return names;
 }
@@ -26,7 +27,8 @@ Result<Evidence> gather(const Model& model, const RecordedTest& test, std::span<
     if (const auto valid = validate(model); !valid) return std::unexpected(valid.error());
     auto run = make_fit_data(model, test, options.calibration);
     if (!run) return std::unexpected(run.error());
-    Evidence evidence{model, std::move(*run), {}, channels_without_sensor(model, test), options.calibration, parallel_for};
+    Evidence evidence{
+        model, std::move(*run), {}, channels_without_sensor(model, test), options.calibration, parallel_for};
     for (const Holdout& holdout : holdouts) {
         auto data = make_fit_data(model, holdout.test, options.calibration);
         if (!data) return fail(data.error().next, fmt::format("{}: {}", holdout.name, data.error().message));
@@ -36,38 +38,47 @@ Result<Evidence> gather(const Model& model, const RecordedTest& test, std::span<
 }
 
 GapVerdict verdict_of(const SearchResult& search) {
-    const bool rest = search.left.something_is_missing();
+    const bool rest =
+        search.left.something_is_missing() || std::ranges::any_of(search.steps, &Step::doubtful);
     if (search.steps.empty()) return rest ? GapVerdict::unexplained : GapVerdict::agrees;
     return rest ? GapVerdict::partly_explained : GapVerdict::explained;
 }
 
 std::string reason_of(const SearchResult& search, const Diagnosis& diagnosis) {
-    const std::string odds = fmt::format("probability that nothing {} missing {:.2g}, that it has no name in the catalogue {:.2g}",
-                                         search.steps.empty() ? "is" : "more is", search.left.nothing, search.left.nameless);
+    const std::string odds =
+        fmt::format("probability that nothing {} missing {:.2g}, that it has no name in the catalogue {:.2g}",
+                    search.steps.empty() ? "is" : "more is", search.left.nothing, search.left.nameless);
     switch (diagnosis.verdict) {
-        case GapVerdict::agrees: return "nothing beyond the noise and the model's own fidelity: " + odds;
-        case GapVerdict::explained: return "the effects found bring the residual down to the noise: " + odds;
-        case GapVerdict::partly_explained: return "the effects found leave something over: " + odds;
-        case GapVerdict::unexplained: break;
+        case GapVerdict::agrees:
+            return "nothing beyond the noise and the model's own fidelity: " + odds;
+        case GapVerdict::explained:
+            return "the effects found bring the residual down to the noise: " + odds;
+        case GapVerdict::partly_explained:
+            return "the effects found leave something over: " + odds;
+        case GapVerdict::unexplained:
+            break;
     }
     return "something is missing that no effect of the catalogue accounts for: " + odds;
 }
 
-Result<void> compare_runs(const Evidence& evidence, const RecordedTest& test, std::span<const Holdout> holdouts,
-                          const DiagnoseOptions& options, Diagnosis& diagnosis) {
+Result<void> compare_runs(const Evidence& evidence, const RecordedTest& test,
+                          std::span<const Holdout> holdouts, const DiagnoseOptions& options,
+                          Diagnosis& diagnosis) {
     auto run = compare_run(options.found_on, test, evidence.run, diagnosis.calibrated, diagnosis.extended);
     if (!run) return std::unexpected(run.error());
     diagnosis.run = std::move(*run);
     for (std::size_t k = 0; k < holdouts.size(); ++k) {
-        auto held = compare_run(holdouts[k].name, holdouts[k].test, evidence.holdouts[k], diagnosis.calibrated,
-                                diagnosis.extended);
-        if (!held) return fail(held.error().next, fmt::format("{}: {}", holdouts[k].name, held.error().message));
+        auto held = compare_run(holdouts[k].name, holdouts[k].test, evidence.holdouts[k],
+                                diagnosis.calibrated, diagnosis.extended);
+        if (!held)
+            return fail(held.error().next, fmt::format("{}: {}", holdouts[k].name, held.error().message));
         diagnosis.holdouts.push_back(std::move(*held));
     }
     return {};
 }
 
-Model extended_model(const Model& calibrated, const std::vector<FoundEffect>& effects, const SearchResult& search) {
+Model extended_model(const Model& calibrated, const std::vector<FoundEffect>& effects,
+                     const SearchResult& search) {
     Model model = search.steps.empty() ? calibrated : search.current.fit.model;
     model.effects.resize(calibrated.effects.size());
     for (const FoundEffect& found : effects) model.effects.push_back(found.effect);
@@ -78,10 +89,14 @@ Model extended_model(const Model& calibrated, const std::vector<FoundEffect>& ef
 
 std::string_view to_string(GapVerdict verdict) {
     switch (verdict) {
-        case GapVerdict::agrees: return "agrees";
-        case GapVerdict::explained: return "explained";
-        case GapVerdict::partly_explained: return "partly_explained";
-        case GapVerdict::unexplained: break;
+        case GapVerdict::agrees:
+            return "agrees";
+        case GapVerdict::explained:
+            return "explained";
+        case GapVerdict::partly_explained:
+            return "partly_explained";
+        case GapVerdict::unexplained:
+            break;
     }
     return "unexplained";
 }
@@ -109,10 +124,12 @@ Result<Diagnosis> diagnose(const Model& model, const RecordedTest& test, std::sp
     diagnosis.reason = reason_of(*search, diagnosis);
     diagnosis.share_of_rise = options.calibration.fidelity.share_of_rise;
     if (diagnosis.verdict != GapVerdict::agrees) {
-        diagnosis.disagreements = disagreements_of(evidence->run, search->base.fit.point, options.calibration.fidelity);
+        diagnosis.disagreements =
+            disagreements_of(evidence->run, search->base.fit.point, options.calibration.fidelity);
         diagnosis.residual_heat = residual_heat_of(evidence->run, model, search->first_survey.nameless, 4);
     }
-    if (auto done = compare_runs(*evidence, test, holdouts, options, diagnosis); !done) return std::unexpected(done.error());
+    if (auto done = compare_runs(*evidence, test, holdouts, options, diagnosis); !done)
+        return std::unexpected(done.error());
     return diagnosis;
 }
 

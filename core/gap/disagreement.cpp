@@ -29,16 +29,20 @@ Smoothed smooth(const FitData& data, const FitPoint& point, Eigen::Index column,
         }
         if (count == 0) continue;
         result.mean_C(row) = sum_C / count;
-        result.sigmas(row) = std::abs(result.mean_C(row)) / std::sqrt(noise / (count * count) + wander_C * wander_C);
+        result.sigmas(row) =
+            std::abs(result.mean_C(row)) / std::sqrt(noise / (count * count) + wander_C * wander_C);
     }
     return result;
 }
 
-Disagreement summary(const FitData& data, const FitPoint& point, const Smoothed& smoothed, Eigen::Index column,
-                     Eigen::Index from, Eigen::Index to) {
+Disagreement summary(const FitData& data, const FitPoint& point, const Smoothed& smoothed,
+                     Eigen::Index column, Eigen::Index from, Eigen::Index to) {
     Disagreement one{data.seen.channels[static_cast<std::size_t>(column)],
                      data.seen.time_s[static_cast<std::size_t>(from)],
-                     data.seen.time_s[static_cast<std::size_t>(to)], 0.0, 0.0, 0.0};
+                     data.seen.time_s[static_cast<std::size_t>(to)],
+                     0.0,
+                     0.0,
+                     0.0};
     double sum = 0.0;
     int count = 0;
     for (Eigen::Index row = from; row <= to; ++row) {
@@ -84,9 +88,11 @@ std::vector<double> own_temperature(const FitData& data, const Model& model, con
         const Sensor& sensor = model.sensors[data.seen.sensors[column]];
         if ((nameless.of_sensor ? sensor.channel : sensor.node) != nameless.at) continue;
         for (std::size_t k = 0; k < result.size(); ++k) {
-            const auto row = std::ranges::lower_bound(data.seen.time_s, nameless.time_s[k]) - data.seen.time_s.begin();
+            const auto row =
+                std::ranges::lower_bound(data.seen.time_s, nameless.time_s[k]) - data.seen.time_s.begin();
             const auto last = static_cast<std::ptrdiff_t>(data.seen.rows()) - 1;
-            const double reading_C = data.seen.reading_C(std::min(row, last), static_cast<Eigen::Index>(column));
+            const double reading_C =
+                data.seen.reading_C(std::min(row, last), static_cast<Eigen::Index>(column));
             if (std::isfinite(reading_C)) result[k] = reading_C;
         }
         break;
@@ -107,12 +113,14 @@ std::string what_it_follows(const FitData& data, const Model& model, const Namel
     for (const Source& source : model.sources) {
         if (source.proportional_to.empty()) continue;
         std::vector<double> drive;
-        for (const double t : nameless.time_s) drive.push_back(column_at(data.seen.inputs, source.proportional_to, t));
+        for (const double t : nameless.time_s)
+            drive.push_back(column_at(data.seen.inputs, source.proportional_to, t));
         try_driver("speed", drive);
     }
     if (!model.ambient.column.empty()) {
         std::vector<double> room;
-        for (const double t : nameless.time_s) room.push_back(column_at(data.seen.inputs, model.ambient.column, t));
+        for (const double t : nameless.time_s)
+            room.push_back(column_at(data.seen.inputs, model.ambient.column, t));
         try_driver("ambient", room);
     }
     try_driver("own temperature", own_temperature(data, model, nameless));
@@ -121,10 +129,12 @@ std::string what_it_follows(const FitData& data, const Model& model, const Namel
 
 }  // namespace
 
-std::vector<Disagreement> disagreements_of(const FitData& data, const FitPoint& point, const ModelFidelity& fidelity) {
+std::vector<Disagreement> disagreements_of(const FitData& data, const FitPoint& point,
+                                           const ModelFidelity& fidelity) {
     std::vector<Disagreement> all;
     for (Eigen::Index column = 0; column < point.difference_C.cols(); ++column) {
-        const Smoothed smoothed = smooth(data, point, column, fidelity.share_of_rise * data.seen.range_C(column));
+        const Smoothed smoothed =
+            smooth(data, point, column, fidelity.share_of_rise * data.seen.range_C(column));
         Eigen::Index from = -1, last = -1;
         const auto close = [&] {
             if (from >= 0 && last > from) all.push_back(summary(data, point, smoothed, column, from, last));
@@ -144,8 +154,8 @@ std::vector<Disagreement> disagreements_of(const FitData& data, const FitPoint& 
     return all;
 }
 
-std::vector<ResidualHeat> residual_heat_of(const FitData& data, const Model& model, const std::vector<Nameless>& nameless,
-                                           std::size_t count) {
+std::vector<ResidualHeat> residual_heat_of(const FitData& data, const Model& model,
+                                           const std::vector<Nameless>& nameless, std::size_t count) {
     std::vector<ResidualHeat> result;
     for (const Nameless& one : nameless) {
         if (result.size() == count || one.log_bayes_factor < 3.0) break;

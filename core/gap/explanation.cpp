@@ -25,9 +25,9 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
-/// Before the spindle starts the machine is about as warm everywhere as the spread of all first readings says (Student's t,
-/// three degrees of freedom: a warm corner is no miracle). Speaks for an offset that brings its sensor back to the others,
-/// and against one that takes it away from them.
+/// Before the spindle starts the machine is about as warm everywhere as the spread of all first readings says
+/// (Student's t, three degrees of freedom: a warm corner is no miracle). Speaks for an offset that brings its
+/// sensor back to the others, and against one that takes it away from them.
 double start_consensus(const FitData& data, const Model& model) {
     std::vector<double> first_C, away_C;
     for (const auto& reading : data.seen.inputs.first_readings) first_C.push_back(reading.value_C);
@@ -77,7 +77,8 @@ double log_evidence(const Fit& fit, double run_length_s) {
     return result;
 }
 
-Result<Explanation> explain(const Evidence& evidence, std::vector<Effect> effects, const Explanation* neighbour) {
+Result<Explanation> explain(const Evidence& evidence, std::vector<Effect> effects,
+                            const Explanation* neighbour) {
     const FitProblem problem(evidence.run, with_effects(evidence.prior_model, effects));
     FitStart start{problem.prior_coordinates(), nullptr};
     if (neighbour != nullptr) {
@@ -87,8 +88,8 @@ Result<Explanation> explain(const Evidence& evidence, std::vector<Effect> effect
     auto fit = minimise(problem, start, evidence.calibration);
     if (!fit) return std::unexpected(fit.error());
     Explanation explanation{std::move(effects), std::move(*fit), 0.0, 0.0};
-    explanation.log_evidence =
-        log_evidence(explanation.fit, length_s(evidence.run)) + start_consensus(evidence.run, explanation.fit.model);
+    explanation.log_evidence = log_evidence(explanation.fit, length_s(evidence.run)) +
+                               start_consensus(evidence.run, explanation.fit.model);
     return explanation;
 }
 
@@ -97,8 +98,8 @@ Result<Explanation> polish(const Evidence& evidence, const Explanation& explanat
     auto fit = minimise(problem, {explanation.fit.point.coordinates, nullptr}, evidence.calibration);
     if (!fit) return std::unexpected(fit.error());
     Explanation polished{explanation.effects, std::move(*fit), 0.0, 0.0};
-    polished.log_evidence =
-        log_evidence(polished.fit, length_s(evidence.run)) + start_consensus(evidence.run, polished.fit.model);
+    polished.log_evidence = log_evidence(polished.fit, length_s(evidence.run)) +
+                            start_consensus(evidence.run, polished.fit.model);
     return polished;
 }
 

@@ -26,15 +26,16 @@ struct Evidence {
 struct Explanation {
     std::vector<Effect> effects;  ///< as they stood when the fit began: with the catalogue's priors
     Fit fit;
-    double log_evidence = 0.0;   ///< of the run: Laplace
-    double log_prediction = 0.0; ///< of the held-out runs, over what it extends
+    double log_evidence = 0.0;    ///< of the run: Laplace
+    double log_prediction = 0.0;  ///< of the held-out runs, over what it extends
 };
 
 Model with_effects(const Model& model, const std::vector<Effect>& effects);
 
-/// Fits the prior model with these effects. `neighbour`: a fit from which the numbers and sensitivities of what both
-/// have in common are taken; null: from the priors, everything computed.
-Result<Explanation> explain(const Evidence& evidence, std::vector<Effect> effects, const Explanation* neighbour);
+/// Fits the prior model with these effects. `neighbour`: a fit from which the numbers and sensitivities of
+/// what both have in common are taken; null: from the priors, everything computed.
+Result<Explanation> explain(const Evidence& evidence, std::vector<Effect> effects,
+                            const Explanation* neighbour);
 
 /// The same again with every sensitivity computed at the fit.
 Result<Explanation> polish(const Evidence& evidence, const Explanation& explanation);
@@ -57,8 +58,10 @@ struct Survey {
 Survey survey(const Evidence& evidence, const Explanation& current);
 
 struct Forecast {
-    double log_density = 0.0;     ///< ln p(held-out run | run), up to a constant of the held-out run
-    Eigen::MatrixXd sensitivity;  ///< of the whitened residual there, by coordinate
+    double log_density = 0.0;  ///< ln p(held-out run | run), up to a constant of the held-out run
+    FitPoint point;            ///< the fit, in the held-out run
+    Eigen::MatrixXd
+        sensitivity;  ///< of the whitened readings' residual there, by coordinate: numbers, starts, places
 };
 /// A fit predicts another run; its numbers and the starts of the nodes are no better known than they are.
 /// `known_sensitivity`: of a neighbouring explanation with fewer effects, taken for what both have in common.

@@ -8,6 +8,8 @@
 namespace thermbal {
 namespace {
 
+/// What a start and a sensor's place may be off by at most: they must not swallow what the model lacks.
+constexpr double most_nuisance_sigmas = 3.0;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
 /// First readings on the same node belong together.
@@ -117,7 +119,8 @@ Result<FitPoint> FitProblem::evaluate(const Eigen::VectorXd& coordinates) const 
         const Parameter& parameter = parameters_[static_cast<std::size_t>(i)];
         priors(i) = parameter.prior_residual(parameter.to_value(coordinates(i)));
     }
-    for (Eigen::Index i = count; i < dimensions(); ++i) priors(i) = coordinates(i) / nuisance_sigma(i - count);
+    for (Eigen::Index i = count; i < dimensions(); ++i)
+        priors(i) = coordinates(i) / nuisance_sigma(i - count);
     point.chi2 = point.residual.squaredNorm();
     return point;
 }
@@ -128,6 +131,9 @@ Eigen::VectorXd FitProblem::lower() const {
         const Parameter& p = parameters_[i];
         bound(static_cast<Eigen::Index>(i)) = p.logarithmic ? bounded_log(p.lower) : p.lower;
     }
+    for (Eigen::Index k = 0; k < data_->nuisances(); ++k) {
+        bound(static_cast<Eigen::Index>(parameters_.size()) + k) = -most_nuisance_sigmas * nuisance_sigma(k);
+    }
     return bound;
 }
 
@@ -136,6 +142,9 @@ Eigen::VectorXd FitProblem::upper() const {
     for (std::size_t i = 0; i < parameters_.size(); ++i) {
         const Parameter& p = parameters_[i];
         bound(static_cast<Eigen::Index>(i)) = p.to_coordinate(p.upper);
+    }
+    for (Eigen::Index k = 0; k < data_->nuisances(); ++k) {
+        bound(static_cast<Eigen::Index>(parameters_.size()) + k) = most_nuisance_sigmas * nuisance_sigma(k);
     }
     return bound;
 }
@@ -155,8 +164,10 @@ double FitProblem::step_of(Eigen::Index coordinate, const FitPoint& point) const
         const double step_s = 0.5 * data_->seen.bin_s;
         return p.logarithmic ? step_s / std::max(std::exp(point.coordinates(coordinate)), step_s) : step_s;
     }
-    if (p.name.ends_with("period_s")) {  // many cycles long: a small change of the period moves the last one far
-        const double cycles = (data_->seen.time_s.back() - data_->seen.time_s.front()) / p.to_value(point.coordinates(coordinate));
+    if (p.name.ends_with(
+            "period_s")) {  // many cycles long: a small change of the period moves the last one far
+        const double cycles = (data_->seen.time_s.back() - data_->seen.time_s.front()) /
+                              p.to_value(point.coordinates(coordinate));
         return 0.05 / std::max(cycles, 1.0);
     }
     if (p.logarithmic) return 0.01;

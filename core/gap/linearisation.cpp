@@ -9,7 +9,8 @@ Linearisation::Linearisation(const Fit& fit)
       log_determinant_(hessian_.vectorD().array().abs().log().sum()),
       // A fit that stopped short of its optimum must not look like something missing.
       residual_(fit.point.residual.head(samples_) -
-                fit.jacobian.topRows(samples_) * hessian_.solve(fit.jacobian.transpose() * fit.point.residual)) {}
+                fit.jacobian.topRows(samples_) *
+                    hessian_.solve(fit.jacobian.transpose() * fit.point.residual)) {}
 
 Eigen::MatrixXd Linearisation::project(const Eigen::MatrixXd& whitened) const {
     const auto sensitivities = fit_->jacobian.topRows(samples_);

@@ -9,8 +9,20 @@ namespace {
 double log_prior(const Candidate& candidate, const Model& model, const OddsOptions& options) {
     const double kinds = static_cast<double>(effect_catalogue().size());
     const double forms = static_cast<double>(candidate.definition->forms.size());
-    const double places = std::max<double>(1.0, static_cast<double>(possible_places(*candidate.form, model).size()));
+    const double places =
+        std::max<double>(1.0, static_cast<double>(possible_places(*candidate.form, model).size()));
     return std::log(options.catalogue / kinds / forms / places);
+}
+
+/// Something without a name forecasts nothing, but a name must not win by forecasting roughly right what it
+/// does not describe well: on the run itself it has to be as good as the nameless. So the nameless gets what
+/// the best forecast gains.
+double forecast_credit(const Survey& survey) {
+    double credit = 0.0;
+    for (const Contender& contender : survey.contenders) {
+        credit = std::max(credit, contender.explanation.log_prediction);
+    }
+    return credit;
 }
 
 }  // namespace
@@ -22,8 +34,11 @@ Odds odds_of(const Survey& survey, const Model& model, const OddsOptions& option
         named.push_back(contender.log_bayes_factor + log_prior(contender.candidate, model, options));
         largest = std::max(largest, named.back());
     }
+    const double credit = forecast_credit(survey);
     for (const Nameless& one : survey.nameless) {
-        const double worth = one.log_bayes_factor > 0.0 ? options.nameless_discount * one.log_bayes_factor : one.log_bayes_factor;
+        const double worth = one.log_bayes_factor > 0.0
+                                 ? options.nameless_discount * one.log_bayes_factor + credit
+                                 : one.log_bayes_factor;
         nameless.push_back(worth + std::log(options.nameless / static_cast<double>(survey.nameless.size())));
         largest = std::max(largest, nameless.back());
     }
@@ -50,7 +65,8 @@ Odds odds_of(const Survey& survey, const Model& model, const OddsOptions& option
     for (Suspect& suspect : odds.kinds) suspect.probability /= total;
     std::vector<std::size_t> order(odds.kinds.size());
     for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
-    std::ranges::sort(order, std::ranges::greater{}, [&](std::size_t i) { return odds.kinds[i].probability; });
+    std::ranges::sort(order, std::ranges::greater{},
+                      [&](std::size_t i) { return odds.kinds[i].probability; });
     Odds sorted{odds.nothing, odds.nameless, {}, {}};
     for (const std::size_t i : order) {
         sorted.kinds.push_back(odds.kinds[i]);

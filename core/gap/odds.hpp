@@ -11,8 +11,8 @@ struct OddsOptions {
     double nothing_missing = 0.80;
     double catalogue = 0.185;  ///< spread evenly over kinds, a kind's over its places
     double nameless = 0.015;
-    /// The nameless explanation also dresses up the model's own limits, which grow with the effect: it has to be better than
-    /// the named one by this much before the name is doubted.
+    /// The nameless explanation also dresses up the model's own limits, which grow with the effect: it has to
+    /// be better than the named one by this much before the name is doubted.
     double nameless_discount = 0.9;
 };
 
@@ -20,7 +20,8 @@ struct OddsOptions {
 struct Odds {
     double nothing = 1.0;
     double nameless = 0.0;
-    std::vector<Suspect> kinds;        ///< best first; probability of the kind anywhere, place of its best contender
+    std::vector<Suspect>
+        kinds;  ///< best first; probability of the kind anywhere, place of its best contender
     std::vector<std::size_t> best_of;  ///< index into Survey::contenders for each of kinds
 
     bool something_is_missing() const { return nothing < 0.5; }

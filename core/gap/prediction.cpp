@@ -49,12 +49,13 @@ Eigen::MatrixXd spread_of(const FitProblem& there, const Fit& fit, Index starts_
 }
 
 double gaussian_log_density(const Eigen::VectorXd& residual, const Eigen::MatrixXd& sensitivity) {
-    const Eigen::MatrixXd inner =
-        Eigen::MatrixXd::Identity(sensitivity.cols(), sensitivity.cols()) + sensitivity.transpose() * sensitivity;
+    const Eigen::MatrixXd inner = Eigen::MatrixXd::Identity(sensitivity.cols(), sensitivity.cols()) +
+                                  sensitivity.transpose() * sensitivity;
     const Eigen::LLT<Eigen::MatrixXd> solver(inner);
     const Eigen::VectorXd score = sensitivity.transpose() * residual;
     const Eigen::MatrixXd lower = solver.matrixL();
-    return -0.5 * (residual.squaredNorm() - score.dot(solver.solve(score))) - lower.diagonal().array().log().sum();
+    return -0.5 * (residual.squaredNorm() - score.dot(solver.solve(score))) -
+           lower.diagonal().array().log().sum();
 }
 
 }  // namespace
@@ -82,6 +83,7 @@ Result<Forecast> forecast(const FitData& holdout, const Evidence& evidence, cons
     }
     const Eigen::MatrixXd spread = spread_of(there, explanation.fit, starts_here);
     result.log_density = gaussian_log_density(point->residual.head(samples), result.sensitivity * spread);
+    result.point = *point;
     return result;
 }
 

@@ -2,20 +2,22 @@
 #include <cmath>
 
 #include "candidates.hpp"
+#include "ground.hpp"
 
 namespace thermbal {
 namespace {
 
 constexpr int onsets_on_grid = 40;
+constexpr int onsets_of_the_whole_machine = 200;  ///< a stop of a minute or two is over before the next of 40
 
 /// Values of a shape parameter that a fit may have to begin at to arrive.
 std::vector<double> grid_of(const EffectParameterDefinition& definition, const ResolvedPrior& prior,
-                            const Observation& seen, const std::vector<double>& periods_s) {
+                            const Observation& seen, const std::vector<double>& periods_s, int onset_count) {
     if (definition.is_time) {
         std::vector<double> onsets;
         const double begin_s = seen.time_s.front(), length_s = seen.time_s.back() - begin_s;
-        for (int k = 0; k < onsets_on_grid; ++k)
-            onsets.push_back(begin_s + length_s * (k + 0.5) / onsets_on_grid);
+        for (int k = 0; k < onset_count; ++k)
+            onsets.push_back(begin_s + length_s * (k + 0.5) / onset_count);
         return onsets;
     }
     if (definition.name == "period_s") return periods_s;
@@ -39,7 +41,8 @@ std::vector<Effect> with_phases(const std::vector<Effect>& shapes) {
         for (int k = 0; k < phases; ++k) {
             result.push_back(shape);
             result.back().parameters.push_back({"duty", 0.5, 0.0});
-            result.back().parameters.push_back({"first_on_s", -shape.parameter("period_s") * k / phases, 0.0});
+            result.back().parameters.push_back(
+                {"first_on_s", -shape.parameter("period_s") * k / phases, 0.0});
         }
     }
     return result;
@@ -49,6 +52,8 @@ std::vector<Effect> with_phases(const std::vector<Effect>& shapes) {
 std::vector<Effect> shapes_of(const Candidate& candidate, const Model& model, const Observation& seen,
                               const std::vector<double>& periods_s) {
     std::vector<Effect> shapes = {make_effect(*candidate.definition, *candidate.form, candidate.at, model)};
+    const int onset_count =
+        candidate.form->site == EffectSite::whole_model ? onsets_of_the_whole_machine : onsets_on_grid;
     for (std::size_t p = 1; p < candidate.form->parameters.size(); ++p) {
         const EffectParameterDefinition& definition = candidate.form->parameters[p];
         if (definition.name == "first_on_s") {
@@ -56,7 +61,8 @@ std::vector<Effect> shapes_of(const Candidate& candidate, const Model& model, co
             continue;
         }
         if (definition.when_absent) continue;
-        const auto values = grid_of(definition, resolve_prior(definition, model), seen, periods_s);
+        const auto values =
+            grid_of(definition, resolve_prior(definition, model), seen, periods_s, onset_count);
         std::vector<Effect> wider;
         for (const Effect& shape : shapes) {
             for (const double value : values) {
@@ -93,18 +99,18 @@ double size_of(const SizeProbe& probe, double amplitude, const ResolvedPrior& pr
 
 }  // namespace
 
-Screened screen(const Candidate& candidate, const FitProblem& problem, const Fit& fit,
-                const Linearisation& linearisation, const std::vector<double>& periods_s) {
-    const Observation& seen = problem.data().seen;
-    const ResolvedPrior prior = resolve_prior(candidate.form->parameters.front(), fit.model);
+Screened screen(const Candidate& candidate, const ScreeningGround& ground,
+                const std::vector<double>& periods_s) {
+    const Observation& seen = ground.run();
+    const Model& model = ground.model();
+    const ResolvedPrior prior = resolve_prior(candidate.form->parameters.front(), model);
     const SizeProbe probe = probe_of(prior);
-    Screened best{candidate, make_effect(*candidate.definition, *candidate.form, candidate.at, fit.model),
-                  0.0};
-    for (Effect& shape : shapes_of(candidate, fit.model, seen, periods_s)) {
+    Screened best{candidate, make_effect(*candidate.definition, *candidate.form, candidate.at, model), 0.0};
+    for (Effect& shape : shapes_of(candidate, model, seen, periods_s)) {
         shape.parameters.front().value = probe.value;
-        const auto change = problem.change_by(fit, shape);
+        const auto change = ground.change_by(shape);
         if (!change) continue;
-        const auto gain = linearisation.gain_of(*change);
+        const auto gain = ground.linearisation().gain_of(*change);
         const bool one_sided = probe.relative && prior.lower >= 0.0;
         if (one_sided && gain.amplitude <= 0.0) continue;
         if (gain.log_likelihood <= best.log_likelihood_gain) continue;

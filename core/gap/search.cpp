@@ -1,20 +1,66 @@
 #include "search.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <string>
 
 namespace thermbal {
 namespace {
 
-/// Something is missing, and the catalogue says what rather than only that.
-bool has_a_name(const Odds& odds) {
-    double named = 0.0;
-    for (const Suspect& suspect : odds.kinds) named += suspect.probability;
-    return odds.something_is_missing() && !odds.kinds.empty() && named > 0.5 &&
-           odds.kinds.front().probability > odds.nameless;
-}
+/// What speaks for a next effect: nothing; the nearest relative of something without a name; a name.
+enum class Support { none, relative, name };
+
+constexpr double least_share_of_a_relative = 0.5;
 
 const Contender& best_of(const Survey& survey, const Odds& odds) {
     return survey.contenders[odds.best_of.front()];
+}
+
+Support support_of(const Survey& survey, const Odds& odds) {
+    if (!odds.something_is_missing() || odds.kinds.empty()) return Support::none;
+    double named = 0.0;
+    for (const Suspect& suspect : odds.kinds) named += suspect.probability;
+    if (named > 0.5 && odds.kinds.front().probability > odds.nameless) return Support::name;
+    const Contender& best = best_of(survey, odds);
+    const double on_the_run = best.log_bayes_factor - best.explanation.log_prediction;
+    return on_the_run > least_share_of_a_relative * survey.nameless.front().log_bayes_factor &&
+                   on_the_run > 5.0
+               ? Support::relative
+               : Support::none;
+}
+
+/// The node where an effect shows: a channel's is the one that its sensor sits on; empty where it acts
+/// everywhere.
+std::string node_of(const Effect& effect, const Model& model) {
+    const auto sensor = find_sensor(model, effect.at);
+    const bool of_channel = find_effect(effect.kind)->form_of(effect).site == EffectSite::channel;
+    return of_channel && sensor ? model.sensors[*sensor].node : effect.at;
+}
+
+double onset_of(const Effect& effect) {
+    const double onset_s = effect.parameter("onset_s");
+    return std::isfinite(onset_s) ? onset_s : effect.parameter("from_s");
+}
+
+/// Two names at one node, or two that set in at the same moment, are one cause that the catalogue does not
+/// have, dressed up.
+bool is_dressing_up(const Effect& one, const Effect& other, const Model& model) {
+    constexpr double same_moment_s = 600.0;
+    const std::string node = node_of(one, model);
+    return (!node.empty() && node == node_of(other, model)) ||
+           std::abs(onset_of(one) - onset_of(other)) < same_moment_s;
+}
+
+void doubt_what_is_dressed_up(SearchResult& search) {
+    const std::vector<Effect>& effects = search.current.fit.model.effects;
+    const std::size_t first = effects.size() - search.steps.size();
+    for (std::size_t i = 0; i < search.steps.size(); ++i) {
+        for (std::size_t j = 0; j < search.steps.size(); ++j) {
+            if (i != j && is_dressing_up(effects[first + i], effects[first + j], search.current.fit.model)) {
+                search.steps[i].doubtful = true;
+            }
+        }
+    }
 }
 
 /// Takes effects until nothing more is missing or nothing more has a name.
@@ -22,12 +68,14 @@ Result<void> take_effects(const Evidence& evidence, SearchResult& search, const 
     while (true) {
         Survey found = survey(evidence, search.current);
         Odds odds = odds_of(found, search.current.fit.model);
-        const bool taken = has_a_name(odds) && static_cast<int>(search.steps.size()) < options.max_effects;
+        const Support support = support_of(found, odds);
+        const bool taken =
+            support != Support::none && static_cast<int>(search.steps.size()) < options.max_effects;
         if (taken) {
             auto polished = polish(evidence, best_of(found, odds).explanation);
             if (!polished) return std::unexpected(polished.error());
             search.current = std::move(*polished);
-            search.steps.push_back({search.current.effects.back(), odds});
+            search.steps.push_back({search.current.effects.back(), odds, support == Support::relative});
         }
         if (search.first_survey.nameless.empty()) search.first_survey = std::move(found);
         if (taken) continue;
@@ -36,8 +84,9 @@ Result<void> take_effects(const Evidence& evidence, SearchResult& search, const 
     }
 }
 
-/// The first effect against all that it might be instead, the others staying; it, or what takes its place, goes to the end.
-/// Nothing goes there when nothing speaks for it any more. True when the effects are not the same afterwards.
+/// The first effect against all that it might be instead, the others staying; it, or what takes its place,
+/// goes to the end. Nothing goes there when nothing speaks for it any more. True when the effects are not the
+/// same afterwards.
 Result<bool> look_again(const Evidence& evidence, SearchResult& search) {
     const Effect old = search.current.effects.front();
     const std::vector<Effect> others(search.current.effects.begin() + 1, search.current.effects.end());
@@ -46,7 +95,8 @@ Result<bool> look_again(const Evidence& evidence, SearchResult& search) {
     const Survey found = survey(evidence, *without);
     Odds odds = odds_of(found, without->fit.model);
     search.steps.erase(search.steps.begin());
-    if (!has_a_name(odds)) {
+    const Support support = support_of(found, odds);
+    if (support == Support::none) {
         search.current = std::move(*without);
         return true;
     }
@@ -54,13 +104,14 @@ Result<bool> look_again(const Evidence& evidence, SearchResult& search) {
     if (!polished) return std::unexpected(polished.error());
     search.current = std::move(*polished);
     const Effect& taken = search.current.effects.back();
-    search.steps.push_back({taken, std::move(odds)});
+    search.steps.push_back({taken, std::move(odds), support == Support::relative});
     return taken.kind != old.kind || taken.at != old.at;
 }
 
 }  // namespace
 
-Result<SearchResult> search_effects(const Evidence& evidence, Explanation base, const DiagnoseOptions& options) {
+Result<SearchResult> search_effects(const Evidence& evidence, Explanation base,
+                                    const DiagnoseOptions& options) {
     SearchResult search{{}, base, std::move(base), {}, {}};
     if (auto done = take_effects(evidence, search, options); !done) return std::unexpected(done.error());
     bool changed = false;
@@ -73,6 +124,7 @@ Result<SearchResult> search_effects(const Evidence& evidence, Explanation base, 
     if (changed) {
         if (auto done = take_effects(evidence, search, options); !done) return std::unexpected(done.error());
     }
+    doubt_what_is_dressed_up(search);
     return search;
 }
 

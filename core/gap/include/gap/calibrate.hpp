@@ -12,13 +12,15 @@
 
 namespace thermbal {
 
-/// How far a lumped network may be from the machine without being wrong. Every channel may wander around the model like a
-/// first-order (Ornstein-Uhlenbeck) process, and sits somewhere in its node, so that it rises a little more or less than the
-/// node's mean. Fits, tests and evidence all count against noise, wander and place together.
+/// How far a lumped network may be from the machine without being wrong. Every channel may wander around the
+/// model like a first-order (Ornstein-Uhlenbeck) process, and sits somewhere in its node, so that it rises a
+/// little more or less than the node's mean. Fits, tests and evidence all count against noise, wander and
+/// place together.
 struct ModelFidelity {
-    double share_of_rise = 0.003;  ///< standard deviation of the wander over the channel's own temperature range
+    double share_of_rise =
+        0.003;  ///< standard deviation of the wander over the channel's own temperature range
     double correlation_s = 1200.0;
-    double place_share = 0.01;     ///< standard deviation of (rise at the sensor / rise of its node) - 1
+    double place_share = 0.01;  ///< standard deviation of (rise at the sensor / rise of its node) - 1
 };
 
 struct CalibrationOptions {

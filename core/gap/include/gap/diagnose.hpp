@@ -52,11 +52,11 @@ struct Suspect {
 
 /// An experiment that would tell an effect from a suspect: both are simulated.
 struct SeparatingExperiment {
-    std::string against;      ///< kind
-    std::string experiment;   ///< what to do, in plain words
-    std::string channel;      ///< where the two would differ most
+    std::string against;     ///< kind
+    std::string experiment;  ///< what to do, in plain words
+    std::string channel;     ///< where the two would differ most
     double difference_C = 0.0;
-    double sigmas = 0.0;      ///< of the difference over the whole experiment
+    double sigmas = 0.0;  ///< of the difference over the whole experiment
 };
 
 struct FoundEffect {
@@ -73,8 +73,9 @@ struct FoundEffect {
     double rmse_after_C = 0.0;
 };
 
-/// One run: measured, and simulated by the calibrated model without and with the effects found. Rows: the run's scans.
-/// The start of every node is estimated within the noise of its first reading; nothing else is fitted to a held-out run.
+/// One run: measured, and simulated by the calibrated model without and with the effects found. Rows: the
+/// run's scans. The start of every node is estimated within the noise of its first reading; nothing else is
+/// fitted to a held-out run.
 struct RunComparison {
     std::string name;
     std::vector<double> time_s;
@@ -109,8 +110,8 @@ struct Diagnosis {
     double share_of_rise = 0.0;  ///< the fidelity that the data asked for
 };
 
-/// The gap workflow, from top to bottom. `holdouts` are never fitted: they only weigh how well each explanation predicts.
-/// Errors: those of calibrate. Any thread; parallel_for says how work is spread.
+/// The gap workflow, from top to bottom. `holdouts` are never fitted: they only weigh how well each
+/// explanation predicts. Errors: those of calibrate. Any thread; parallel_for says how work is spread.
 Result<Diagnosis> diagnose(const Model& model, const RecordedTest& test, std::span<const Holdout> holdouts,
                            const DiagnoseOptions& options, const ParallelFor& parallel_for);
 
