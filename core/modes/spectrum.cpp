@@ -211,6 +211,16 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
+double range_over_the_last_hour_C(const AmbientInput& room, double period_s) {
+    if (!room.measured || room.deviation_C.empty()) return 0.0;
+    const auto hour = static_cast<std::size_t>(3600.0 / period_s);
+    const std::size_t scans = std::min(hour, room.deviation_C.size());
+    AmbientInput last = room;
+    last.deviation_C.assign(room.deviation_C.end() - static_cast<std::ptrdiff_t>(scans),
+                            room.deviation_C.end());
+    return last.range_C();
+}
+
 /// The machine answers the room through the same modes as the heat: the response to the room is expected
 /// where the modes are found, slow ones most.
 void tie_ambient_to_modes(const std::vector<std::vector<Mode>>& states, const ModePrior& prior,
@@ -461,6 +471,8 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
     }
 
     const double factor = prior || !start_level_C.empty() ? 1.0 : options.interval_factor;
+    const double floor = std::hypot(options.model_floor_C,
+                                    options.room_floor * range_over_the_last_hour_C(room, window.period_s));
     SpectrumEstimate estimate;
     estimate.time_constant_min = fine_grid;
     estimate.background_time_constant_min = basis.time_constant_min;
@@ -504,8 +516,9 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
         const double sd = std::sqrt(std::max(0.0, second / count - mean * mean));
         const double quantiles_apart =
             mixture_quantile(channel_draws, 0.95) - mixture_quantile(channel_draws, 0.05);
-        const double half = factor * std::max(0.5 * quantiles_apart, sds_of_90_percent * sd);
-        channel.steady_state_sd_C = factor * sd;
+        const double half =
+            std::hypot(factor * std::max(0.5 * quantiles_apart, sds_of_90_percent * sd), floor);
+        channel.steady_state_sd_C = std::hypot(factor * sd, floor / sds_of_90_percent);
         channel.steady_state_low_C = channel.steady_state_C - half;
         channel.steady_state_high_C = channel.steady_state_C + half;
         const Eigen::VectorXd curve =

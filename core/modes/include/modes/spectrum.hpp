@@ -55,6 +55,11 @@ struct SpectrumOptions {
     /// standard deviations (rms) while a window began with its test, and 1.0 to 1.5 after a regime change:
     /// there, and under an archive, the posterior stands as it is.
     double interval_factor = 0.8;
+    /// No model of a machine is better than this, however long it was measured: added to the half width in
+    /// quadrature, in C and as a share of the room's range over the last hour (a cycling room has no one
+    /// mean).
+    double model_floor_C = 0.04;
+    double room_floor = 0.05;
 
     Result<void> check() const;
 };
