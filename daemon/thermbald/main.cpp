@@ -96,10 +96,11 @@ int main(int argc, char** argv) {
     app.set_version_flag("--version", std::string("thermbald ") + version);
     app.add_option("--config", flags.config, "configuration file")->capture_default_str();
     std::string checked_file;
-    auto* check = app.add_option("--check-config", checked_file,
-                                 "check this configuration (without a file: that of --config), print what is in "
-                                 "effect, and end")
-                      ->expected(0, 1);
+    auto* check =
+        app.add_option("--check-config", checked_file,
+                       "check this configuration (without a file: that of --config), print what is in "
+                       "effect, and end")
+            ->expected(0, 1);
     app.add_option("--profiles", flags.profiles, "a further folder with module profiles, looked up first");
     app.add_flag("--exit-when-ended", flags.exit_when_ended,
                  "end when a test has ended (demonstrations, tests)");

@@ -28,8 +28,8 @@ std::optional<Quality> quality_from_string(std::string_view name);
 inline constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
 
 /// One channel at one scan. `raw` is the register as the module sent it (16 or 32 bits, sign not applied);
-/// empty when the module did not answer. `source_C` is what the module said where a calibration has made value_C
-/// of it; NaN where value_C is what the module said.
+/// empty when the module did not answer. `source_C` is what the module said where a calibration has made
+/// value_C of it; NaN where value_C is what the module said.
 struct Sample {
     std::optional<std::uint32_t> raw;
     double value_C = no_value;
