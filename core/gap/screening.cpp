@@ -16,8 +16,7 @@ std::vector<double> grid_of(const EffectParameterDefinition& definition, const R
     if (definition.is_time) {
         std::vector<double> onsets;
         const double begin_s = seen.time_s.front(), length_s = seen.time_s.back() - begin_s;
-        for (int k = 0; k < onset_count; ++k)
-            onsets.push_back(begin_s + length_s * (k + 0.5) / onset_count);
+        for (int k = 0; k < onset_count; ++k) onsets.push_back(begin_s + length_s * (k + 0.5) / onset_count);
         return onsets;
     }
     if (definition.name == "period_s") return periods_s;
@@ -104,19 +103,26 @@ Screened screen(const Candidate& candidate, const ScreeningGround& ground,
     const Observation& seen = ground.run();
     const Model& model = ground.model();
     const ResolvedPrior prior = resolve_prior(candidate.form->parameters.front(), model);
-    const SizeProbe probe = probe_of(prior);
+    std::vector<SizeProbe> probes = {probe_of(prior)};
+    // A size that is a length of time changes the effect's shape: a stop of a minute is not a tenth of one of
+    // ten.
+    if (candidate.form->parameters.front().name == "duration_s") {
+        probes.push_back({true, std::max(0.1 * prior.centre, seen.bin_s)});
+    }
     Screened best{candidate, make_effect(*candidate.definition, *candidate.form, candidate.at, model), 0.0};
-    for (Effect& shape : shapes_of(candidate, model, seen, periods_s)) {
-        shape.parameters.front().value = probe.value;
-        const auto change = ground.change_by(shape);
-        if (!change) continue;
-        const auto gain = ground.linearisation().gain_of(*change);
-        const bool one_sided = probe.relative && prior.lower >= 0.0;
-        if (one_sided && gain.amplitude <= 0.0) continue;
-        if (gain.log_likelihood <= best.log_likelihood_gain) continue;
-        best.log_likelihood_gain = gain.log_likelihood;
-        best.start = shape;
-        best.start.parameters.front().value = size_of(probe, gain.amplitude, prior);
+    for (const SizeProbe& probe : probes) {
+        for (Effect& shape : shapes_of(candidate, model, seen, periods_s)) {
+            shape.parameters.front().value = probe.value;
+            const auto change = ground.change_by(shape);
+            if (!change) continue;
+            const auto gain = ground.linearisation().gain_of(*change);
+            const bool one_sided = probe.relative && prior.lower >= 0.0;
+            if (one_sided && gain.amplitude <= 0.0) continue;
+            if (gain.log_likelihood <= best.log_likelihood_gain) continue;
+            best.log_likelihood_gain = gain.log_likelihood;
+            best.start = shape;
+            best.start.parameters.front().value = size_of(probe, gain.amplitude, prior);
+        }
     }
     return best;
 }
