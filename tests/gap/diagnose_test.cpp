@@ -1,0 +1,94 @@
+#include "gap/diagnose.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "explanation.hpp"
+#include "network/effect.hpp"
+#include "odds.hpp"
+#include "small_machine.hpp"
+
+namespace thermbal {
+namespace {
+
+Model with(const std::string& kind, const std::string& at, std::vector<EffectParameter> parameters) {
+    Model model = small_machine();
+    model.effects.push_back({kind, "", at, std::move(parameters), {}});
+    return model;
+}
+
+Result<Diagnosis> diagnosis_of(const Model& truth) {
+    return diagnose(small_machine(), measured_on(truth, 300.0, 0.05, 7), {}, {}, sequential_for);
+}
+
+TEST(Diagnose, AgreesWhereNothingIsMissing) {
+    const auto diagnosis = diagnosis_of(small_machine());
+    ASSERT_TRUE(diagnosis.has_value()) << diagnosis.error().message;
+    EXPECT_EQ(diagnosis->verdict, GapVerdict::agrees) << diagnosis->reason;
+    EXPECT_TRUE(diagnosis->effects.empty());
+    EXPECT_TRUE(diagnosis->disagreements.empty());
+}
+
+TEST(Diagnose, FindsHeatThatSetsIn) {
+    const auto diagnosis =
+        diagnosis_of(with("cutting_heat", "housing", {{"power_W", 25.0, 0.0}, {"onset_s", 7200.0, 0.0}}));
+    ASSERT_TRUE(diagnosis.has_value()) << diagnosis.error().message;
+    ASSERT_EQ(diagnosis->effects.size(), 1u) << diagnosis->reason;
+    const FoundEffect& found = diagnosis->effects.front();
+    EXPECT_EQ(diagnosis->verdict, GapVerdict::explained);
+    EXPECT_EQ(found.effect.kind, "cutting_heat");
+    EXPECT_EQ(found.at, "housing");
+    EXPECT_NEAR(found.from_s, 7200.0, 120.0);
+    EXPECT_NEAR(found.effect.parameter("power_W"), 25.0, 4.0);
+    EXPECT_GT(found.probability, 0.9);
+    EXPECT_LT(diagnosis->run.after_rmse_C, 0.056);
+    EXPECT_FALSE(diagnosis->disagreements.empty());
+}
+
+TEST(Diagnose, ASensorIsNotTheMachine) {
+    const auto diagnosis = diagnosis_of(with("sensor_drift", "T2", {{"rate_C_per_h", 0.3, 0.0}}));
+    ASSERT_TRUE(diagnosis.has_value()) << diagnosis.error().message;
+    ASSERT_EQ(diagnosis->effects.size(), 1u) << diagnosis->reason;
+    EXPECT_EQ(diagnosis->effects.front().effect.kind, "sensor_drift");
+    EXPECT_EQ(diagnosis->effects.front().at, "T2");
+}
+
+TEST(Diagnose, TheExtendedModelIsAModelAgain) {
+    const auto diagnosis =
+        diagnosis_of(with("cutting_heat", "bed", {{"power_W", 60.0, 0.0}, {"onset_s", 6000.0, 0.0}}));
+    ASSERT_TRUE(diagnosis.has_value());
+    EXPECT_TRUE(validate(diagnosis->extended).has_value());
+    EXPECT_EQ(diagnosis->extended.effects.size(), diagnosis->effects.size());
+}
+
+Survey survey_with(double named, double forecast, double nameless) {
+    Survey survey;
+    const EffectDefinition& kind = *find_effect("cutting_heat");
+    Contender contender{{&kind, &kind.forms.front(), "housing"}, {}, named + forecast};
+    contender.explanation.log_prediction = forecast;
+    survey.contenders.push_back(std::move(contender));
+    survey.nameless.push_back({false, "housing", nameless, {}, {}, {}});
+    return survey;
+}
+
+TEST(Odds, WithoutEvidenceNothingIsMissing) {
+    const Odds odds = odds_of(survey_with(0.0, 0.0, -2.0), small_machine());
+    EXPECT_FALSE(odds.something_is_missing());
+}
+
+TEST(Odds, ANameHasToDescribeTheRunAsWellAsNoName) {
+    EXPECT_GT(odds_of(survey_with(60.0, 0.0, 50.0), small_machine()).kinds.front().probability, 0.99);
+    EXPECT_LT(odds_of(survey_with(60.0, 0.0, 120.0), small_machine()).kinds.front().probability, 0.01);
+    // A good forecast does not save it.
+    EXPECT_LT(odds_of(survey_with(60.0, 90.0, 120.0), small_machine()).kinds.front().probability, 0.01);
+}
+
+TEST(Odds, AreProbabilities) {
+    const Odds odds = odds_of(survey_with(5.0, 1.0, 6.0), small_machine());
+    EXPECT_NEAR(odds.nothing + odds.nameless + odds.kinds.front().probability, 1.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace thermbal
