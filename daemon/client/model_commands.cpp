@@ -2,6 +2,7 @@
 
 #include "calibrate_command.hpp"
 #include "commands.hpp"
+#include "diagnose_command.hpp"
 #include "simulate_command.hpp"
 
 namespace thermbal {
@@ -45,11 +46,31 @@ void add_calibrate(CLI::App& app, int& status) {
     calibrate_command.callback([&status, calibrate] { status = run_calibrate(*calibrate); });
 }
 
+void add_diagnose(CLI::App& app, int& status) {
+    const auto diagnose = std::make_shared<DiagnoseCommand>();
+    CLI::App& diagnose_command = *app.add_subcommand(
+        "diagnose", "where a model and a recorded test disagree, and what effect the model lacks");
+    diagnose_command.group(group);
+    diagnose_command.add_option("FILE", diagnose->file, "recorded test: CSV")->required();
+    diagnose_command.add_option("--model", diagnose->model, "simulation model: TOML")->required();
+    diagnose_command.add_option("--holdout", diagnose->holdouts,
+                                "another run of the machine, never fitted; may be given several times");
+    diagnose_command.add_option("--write-model", diagnose->write_model,
+                                "where the model with the effects found goes");
+    diagnose_command.add_option("--report", diagnose->report, "where an HTML report goes");
+    diagnose_command.add_option("--threads", diagnose->threads, "compute threads")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 256));
+    diagnose_command.add_flag("--json", diagnose->json, "one JSON document on standard output");
+    diagnose_command.callback([&status, diagnose] { status = run_diagnose(*diagnose); });
+}
+
 }  // namespace
 
 void add_model_commands(CLI::App& app, int& status) {
     add_simulate(app, status);
     add_calibrate(app, status);
+    add_diagnose(app, status);
 }
 
 }  // namespace thermbal

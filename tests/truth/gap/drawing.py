@@ -55,7 +55,7 @@ def draw_machine(rng):
     for i, (name, capacity, surface) in enumerate(PARTS):
         strongest = max(j.conductance_W_per_K for j in joints if i in (j.a, j.b))
         parts.append(Part(name, 1000 * capacity * np.exp(rng.normal(0, 0.25)), surface * np.exp(rng.normal(0, 0.25)),
-                          strongest * rng.uniform(25, 70)))
+                          strongest * rng.uniform(80, 200)))
         w = rng.uniform(0.6, 1.4, CELLS)
         weights.append(w / w.sum())
     heats = []
