@@ -557,6 +557,7 @@ TEST(LinkRtu, ALinkThatPointsToAnotherPortIsFollowedWithinOneCall) {
     std::filesystem::create_symlink(before->device(), by_id);
     LinkOptions options = before->options();
     options.device = by_id;
+    options.response_timeout_s = 1.0;
     options.longest_pause_s = options.first_pause_s = 0.02;
     const auto link = make_link(options);
     EXPECT_TRUE(link->read_block(1, 3, 0, 8));
