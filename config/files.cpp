@@ -14,8 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t largest_file = 4 << 20;
-
 struct CloseFile {
     void operator()(std::FILE* file) const { std::fclose(file); }
 };
@@ -47,16 +45,29 @@ std::string profiles_there(const std::vector<std::string>& folders) {
 
 }  // namespace
 
-Result<std::string> read_text_file(const std::string& path) {
+Result<std::string> read_text_file(const std::string& path, std::size_t most_bytes) {
     std::error_code error;
     if (fs::is_directory(path, error)) return refuse_file(path, "is a folder; a file is needed");
     const std::unique_ptr<std::FILE, CloseFile> file(std::fopen(path.c_str(), "rbe"));
     if (!file) return refuse_file(path, std::generic_category().message(errno));
-    std::string text(largest_file + 1, '\0');
-    text.resize(std::fread(text.data(), 1, text.size(), file.get()));
+    std::string text;
+    std::string buffer(std::size_t{1} << 16, '\0');
+    for (std::size_t got = 0; (got = std::fread(buffer.data(), 1, buffer.size(), file.get())) > 0;) {
+        text.append(buffer, 0, got);
+        if (text.size() > most_bytes) {
+            return refuse_file(path, fmt::format("is larger than {} MiB", most_bytes >> 20));
+        }
+    }
     if (std::ferror(file.get()) != 0) return refuse_file(path, "cannot be read to its end");
-    if (text.size() > largest_file) return refuse_file(path, "is larger than 4 MiB");
     return text;
+}
+
+std::vector<std::string> profile_folders(std::vector<std::string> own) {
+    own.emplace_back("/etc/thermbal/profiles");
+    std::error_code none;
+    const auto program = fs::read_symlink("/proc/self/exe", none);
+    if (!none) own.push_back((program.parent_path().parent_path() / "share/thermbal/profiles").string());
+    return own;
 }
 
 ProfileLookup profiles_in(std::vector<std::string> folders) {

@@ -128,7 +128,8 @@ constexpr std::array estimators{
     Estimator{"svr", "support-vector regression of the paper, literal", false, svr},
     Estimator{"one_exponential", "least squares, one exponential a channel", false, one_exponential},
     Estimator{"two_exponentials", "least squares, two exponentials a channel", false, two_exponentials},
-    Estimator{"kalman", "adaptive unscented Kalman filter, one exponential a channel", false, kalman},
+    Estimator{"kalman", "adaptive unscented Kalman filter, a fast and a slow exponential a channel", false,
+              kalman},
     Estimator{"modes", "time constants shared by all channels", false, modes},
     Estimator{"modes_with_archive", "the same, with earlier tests of the machine", true, modes_with_archive},
 };

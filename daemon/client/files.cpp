@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "config/load.hpp"
+
 namespace thermbal {
 namespace {
 
@@ -15,20 +17,7 @@ using File = std::unique_ptr<std::FILE, int (*)(std::FILE*)>;
 }  // namespace
 
 Result<std::string> read_file(const std::string& path) {
-    constexpr std::size_t most_bytes = std::size_t{1} << 30;
-    const File file(std::fopen(path.c_str(), "rb"), std::fclose);
-    const auto refuse = [&](std::string_view why) {
-        return fail(NextStep::refuse_input, fmt::format("{}: {}", path, why));
-    };
-    if (!file) return refuse(strerrordesc_np(errno));
-    std::string text;
-    std::string buffer(1 << 16, '\0');
-    for (std::size_t got = 0; (got = std::fread(buffer.data(), 1, buffer.size(), file.get())) > 0;) {
-        text.append(buffer, 0, got);
-        if (text.size() > most_bytes) return refuse("larger than 1 GiB");
-    }
-    if (std::ferror(file.get()) != 0) return refuse(strerrordesc_np(errno));
-    return text;
+    return read_text_file(path, std::size_t{1} << 30);
 }
 
 Result<void> write_file(const std::string& path, std::string_view content) {

@@ -49,19 +49,10 @@ Result<void> read_units(const std::string& text, ProbeOptions& options) {
     return {};
 }
 
-std::vector<std::string> profile_folders(const ProbeFlags& flags) {
-    std::vector<std::string> folders = flags.profiles;
-    folders.emplace_back("/etc/thermbal/profiles");
-    std::error_code none;
-    const auto program = std::filesystem::read_symlink("/proc/self/exe", none);
-    if (!none) folders.push_back((program.parent_path().parent_path() / "share/thermbal/profiles").string());
-    return folders;
-}
-
 /// A profile that cannot be read is no reason not to look at the module.
 std::vector<ModuleProfile> profiles_of(const ProbeFlags& flags) {
     std::vector<ModuleProfile> profiles;
-    for (const std::string& folder : profile_folders(flags)) {
+    for (const std::string& folder : profile_folders(flags.profiles)) {
         std::error_code error;
         std::vector<std::string> paths;
         for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;

@@ -29,16 +29,6 @@ struct Flags {
     bool exit_when_ended = false;
 };
 
-/// The user's own profiles first, then the ones that came with the program.
-std::vector<std::string> profile_folders(const Flags& flags) {
-    std::vector<std::string> folders = flags.profiles;
-    folders.emplace_back("/etc/thermbal/profiles");
-    std::error_code none;
-    const auto program = std::filesystem::read_symlink("/proc/self/exe", none);
-    if (!none) folders.push_back((program.parent_path().parent_path() / "share/thermbal/profiles").string());
-    return folders;
-}
-
 std::string boot_id() {
     std::ifstream file("/proc/sys/kernel/random/boot_id");
     std::string id;
@@ -119,7 +109,7 @@ int main(int argc, char** argv) {
     flags.check = check->count() > 0;
     if (!checked_file.empty()) flags.config = checked_file;
 
-    auto config = load_config_file(flags.config, profiles_in(profile_folders(flags)));
+    auto config = load_config_file(flags.config, profiles_in(profile_folders(flags.profiles)));
     if (!config) return refused(config.error());
     if (flags.lockstep && config->lines.size() > 1) {
         return refused({NextStep::refuse_input,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -27,8 +28,12 @@ Result<ModuleProfile> load_profile(std::string_view toml, std::string_view file_
 /// A profile as TOML that load_profile accepts and that means the same.
 std::string explain_profile(const ModuleProfile& profile);
 
-/// The text of a file; error (refuse_input) names it and the system's reason.
-Result<std::string> read_text_file(const std::string& path);
+/// The text of a file of at most `most_bytes`; error (refuse_input) names it and the system's reason.
+Result<std::string> read_text_file(const std::string& path, std::size_t most_bytes = std::size_t{4} << 20);
+
+/// Where profiles are looked for: the user's own folders first, then /etc/thermbal/profiles, then the ones
+/// that came with the running program.
+std::vector<std::string> profile_folders(std::vector<std::string> own);
 
 /// Looks NAME up as NAME.toml in the folders, the first that has it wins; a name with a '/' or ending in
 /// ".toml" is a path. Reads the file at every call.

@@ -8,9 +8,9 @@ namespace thermbal {
 
 /// The paper asks for a "distinct minimum" of RMSE over the number of lags n and leaves open what that is.
 /// Ours, on y(n) = ln RMSE(n), since an RMSE is known by its ratio and not by its difference:
-///   scatter = 1.4826 * median |second difference of y| / sqrt(6)     the curve's own roughness
-///   depth   = upper decile of y - min(y)                             how far the minimum lies below the
-///   curve falling = (lowest y up to edge_lags before the end) - min(y)     what the last lags still gain
+/// - scatter = 1.4826 median |second difference of y| / sqrt(6): the curve's own roughness;
+/// - depth = upper decile of y - min(y): how far the minimum lies below the curve;
+/// - falling = (lowest y up to edge_lags before the end) - min(y): what the last lags still gain.
 /// The minimum is clear when it is deep, in itself and against the scatter, when it is not at n = 1, and when
 /// the curve has turned or levelled off before its end (falling <= edge_fall): a curve that still falls at
 /// the largest n has its minimum somewhere beyond. On free runs that follow the filtered window down to its

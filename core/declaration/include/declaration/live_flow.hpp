@@ -51,9 +51,10 @@ enum class SweepWhen {
 
 struct FlowOptions {
     std::string ambient = "T1";  ///< the channel that measures the room; empty: none
-    double tolerance_C = 0.2;    ///< half width that the 90 % interval of a declaration may have ...
-    double tolerance_share_of_rise =
-        0.025;  ///< ... or this share of the channel's whole rise, if that is more
+    /// Half width that the 90 % interval of a declaration may have: so much, or this share of the channel's
+    /// rise.
+    double tolerance_C = 0.2;
+    double tolerance_share_of_rise = 0.025;
     OutlierOptions outliers;
     GapOptions gaps;
     DenoiseOptions filter;
