@@ -7,11 +7,16 @@
 
 namespace thermbal {
 
+Eigen::MatrixXd response_rows(const ReducedChannel& channel, const Basis& basis,
+                              const Eigen::MatrixXd& responses) {
+    return channel.reduced.middleCols(1, basis.grid()) * responses.topRows(basis.grid()) +
+           channel.reduced_fine * responses.bottomRows(channel.reduced_fine.cols());
+}
+
 ChannelModel::ChannelModel(const ReducedChannel& channel, const Basis& basis, const BackgroundPrior& prior,
                            double scale, double mode_scale, const Eigen::VectorXd& functional)
     : scale_squared_(mode_scale * mode_scale) {
     constexpr double free_scale = 10.0;
-    constexpr double difference_scale = 1.5;
     const Eigen::Index count = channel.rotated.size();
     const Eigen::Index extra = basis.has_ambient ? 1 : 0;
     const Eigen::Index responses = prior.responses.cols();
@@ -23,9 +28,7 @@ ChannelModel::ChannelModel(const ReducedChannel& channel, const Basis& basis, co
     fine_ = Eigen::MatrixXd::Zero(count + extra, channel.reduced_fine.cols());
     fine_.topRows(count) = channel.reduced_fine;
     if (responses > 0) {
-        rows_.block(0, basis.size(), count, responses) =
-            channel.reduced.middleCols(1, basis.grid()) * prior.responses.topRows(basis.grid()) +
-            channel.reduced_fine * prior.responses.bottomRows(channel.reduced_fine.cols());
+        rows_.block(0, basis.size(), count, responses) = response_rows(channel, basis, prior.responses);
         functional_.tail(responses) = prior.responses.colwise().sum().transpose();
     }
     value_ = Eigen::VectorXd::Zero(count + extra);
@@ -35,7 +38,7 @@ ChannelModel::ChannelModel(const ReducedChannel& channel, const Basis& basis, co
     prior_mean_ = Eigen::VectorXd::Zero(columns);
     prior_variance_ = Eigen::VectorXd::Zero(columns);
     for (Eigen::Index k = 0; k < responses; ++k) {
-        const double sd = (k == 0 ? free_scale : difference_scale) * scale;
+        const double sd = (k == 0 ? free_scale : 1.0) * scale;
         prior_variance_[basis.size() + k] = sd * sd;
     }
     const double reach = 10.0 * (channel.range_C + 1.0);

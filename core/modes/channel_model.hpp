@@ -19,11 +19,16 @@ struct BackgroundPrior {
     Eigen::VectorXd ambient_mean;  ///< empty without an ambient
     Eigen::VectorXd ambient_variance;
     /// Archived responses of the channel, one a column, on the background's grid and then the modes'; empty
-    /// without. The first is the mean (settling at 1), the others differences from it (settling near 0).
+    /// without. The first (settling at 1) has a free multiple, each of the others one of the channel's scale
+    /// (sd).
     Eigen::MatrixXd responses;
     double ambient_gain_loss_per_C = 0.0;
     double ambient_gain_sd = 0.05;
 };
+
+/// Archived responses in the rotated frame of a channel's samples, one a column.
+Eigen::MatrixXd response_rows(const ReducedChannel& channel, const Basis& basis,
+                              const Eigen::MatrixXd& responses);
 
 /// A steady state, or another linear function of the coefficients, given one state of the modes.
 struct ConditionalValue {
@@ -45,6 +50,10 @@ class ChannelModel {
     /// Sets the modes everything below is conditional on: rotated step columns and the prior of the
     /// amplitudes.
     void condition_on(const Eigen::MatrixXd& columns, const ModeAmplitudes& amplitudes);
+
+    /// The rows' value and covariance, modes left out.
+    const Eigen::VectorXd& value() const { return value_; }
+    const Eigen::MatrixXd& covariance() const { return background_covariance_; }
 
     Eigen::MatrixXd columns_at(const std::vector<Mode>& modes) const;
     ConditionalValue steady_state() const;

@@ -33,10 +33,11 @@ struct GuardOptions {
     double look_back_min = 4.0;        ///< "stable": the window, one this much shorter, and one twice as much
     double drift_in_tolerances = 1.0;  ///< how far the prediction may move over both
     double slow_time_constants = 1.0;  ///< of the slowest supported time constant that must have been seen
-    double share_of_machines_slowest = 0.7;  ///< of the slowest time constant of all channels, for each
-    double share_of_rise = 0.6;              ///< of its way to the steady state that a channel must have gone
-    double svr_agreement_C = 0.0;            ///< 0: the SVR's steady state is reported, it has no veto
-    double overshoot_C = 0.5;  ///< how far a settling channel may be predicted back below where it is
+    double slow_time_constants_archived = 0.5;  ///< ... where earlier tests have shown the slow share
+    double share_of_machines_slowest = 0.7;     ///< of the slowest time constant of all channels, for each
+    double share_of_rise = 0.6;    ///< of its way to the steady state that a channel must have gone
+    double svr_agreement_C = 0.0;  ///< 0: the SVR's steady state is reported, it has no veto
+    double overshoot_C = 0.5;      ///< how far a settling channel may be predicted back below where it is
     double barely_rise_in_tolerances = 1.0;
     double stuck_min = 20.0;    ///< the very same reading for so long or longer ...
     double stuck_rise_C = 1.0;  ///< ... while the median channel moved this much

@@ -45,15 +45,15 @@ Result<SpectrumPrior> learn_prior(const std::vector<ArchivedSpectrum>& tests, co
                                   const ArchiveOptions& options);
 
 /// Whether a window contradicts the archive: its responses, freely scaled and mixed, do not fit, so that the
-/// modes, meant for small differences, carry much amplitude. Matching machines stay below 0.6, other machines
-/// of the same kind lie at 0.9 to 60 (README).
+/// modes, meant for small differences, carry much amplitude. Matching machines stay below 1.3, other machines
+/// of the same kind lie at 4 and far above (README).
 struct Contradiction {
     bool contradicted = false;
     double mode_energy = 0.0;
     std::string reason;  ///< one line for a person, with the figures; empty without contradiction
 };
 
-Contradiction contradiction_of(const SpectrumEstimate& with_archive, double allowed_mode_energy = 0.7);
+Contradiction contradiction_of(const SpectrumEstimate& with_archive, double allowed_mode_energy = 2.0);
 
 /// The estimate with the archive's prior, or, if the window contradicts it, without.
 struct ArchivedEstimate {

@@ -12,6 +12,13 @@
 
 namespace thermbal {
 
+/// How a test mixes the responses of earlier tests: alike on all channels, since one split of the heat and
+/// one speed make the mixture.
+struct MixtureOptions {
+    double prior_sd = 1.0;    ///< of each test's share; an archived test itself lies at 1 in one of them
+    double channel_sd = 0.3;  ///< by which a channel's own mixture differs from the common one
+};
+
 /// How the shared spectrum of time constants is estimated. Defaults hold for a machine tool's spindle head on
 /// a 15 s grid; `check` names the field that is out of bounds.
 struct SpectrumOptions {
@@ -47,6 +54,8 @@ struct SpectrumOptions {
 
     double archive_deviation =
         0.15;  ///< with archived responses modes only carry what differs: this share of the scale
+
+    MixtureOptions mixture;
 
     std::size_t burn_in = 1500;  ///< Metropolis-Hastings steps that are thrown away
     std::size_t draws = 200;     ///< states that are kept
