@@ -157,9 +157,8 @@ Guard slowest_seen_long_enough(const ChannelEstimate& now, const Evidence& evide
         std::max(now.slowest_time_constant_min,
                  options.share_of_machines_slowest * evidence.now->slowest_time_constant_min);
     const double seen_min = (evidence.window.end_s() - evidence.window.start_s) / 60.0;
-    const double needed_min =
-        slowest_min *
-        (evidence.now->used_responses ? options.slow_time_constants_archived : options.slow_time_constants);
+    const double needed_min = slowest_min * (now.used_responses ? options.slow_time_constants_archived
+                                                                : options.slow_time_constants);
     return {"slowest_seen_long_enough", seen_min >= needed_min,
             fmt::format("{:.0f} min seen, slowest time constant {:.0f} min (needed {:.0f} min)", seen_min,
                         slowest_min, needed_min)};

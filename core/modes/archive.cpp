@@ -48,6 +48,19 @@ std::optional<SpectrumPrior::Response> learn_response(const std::vector<Archived
     return response;
 }
 
+double width_C(const ChannelEstimate& channel) {
+    return channel.steady_state_high_C - channel.steady_state_low_C;
+}
+
+/// A channel that did what no earlier test did is known better without them. Both estimates have the same
+/// channels.
+void take_narrower(const SpectrumEstimate& plain, SpectrumEstimate& informed) {
+    for (std::size_t i = 0; i < informed.channels.size(); ++i) {
+        if (width_C(plain.channels[i]) < width_C(informed.channels[i]))
+            informed.channels[i] = plain.channels[i];
+    }
+}
+
 }  // namespace
 
 ArchivedSpectrum archived(const SpectrumEstimate& complete_test) {
@@ -145,15 +158,16 @@ Contradiction contradiction_of(const SpectrumEstimate& with_archive, double allo
 Result<ArchivedEstimate> estimate_with_archive(const TestWindow& window, std::string_view ambient,
                                                const SpectrumPrior& prior, const SpectrumOptions& options,
                                                std::uint64_t seed, const std::vector<double>& start_level_C) {
-    Result<SpectrumEstimate> estimate =
+    Result<SpectrumEstimate> informed =
         estimate_spectrum(window, ambient, prior, options, seed, start_level_C);
-    if (!estimate) return std::unexpected(estimate.error());
-    Contradiction contradiction = contradiction_of(*estimate);
-    if (contradiction.contradicted) {
-        estimate = estimate_spectrum(window, ambient, std::nullopt, options, seed, start_level_C);
-        if (!estimate) return std::unexpected(estimate.error());
-    }
-    return ArchivedEstimate{std::move(*estimate), std::move(contradiction)};
+    if (!informed) return std::unexpected(informed.error());
+    Contradiction contradiction = contradiction_of(*informed);
+    Result<SpectrumEstimate> plain =
+        estimate_spectrum(window, ambient, std::nullopt, options, seed, start_level_C);
+    if (!plain) return std::unexpected(plain.error());
+    if (contradiction.contradicted) return ArchivedEstimate{std::move(*plain), std::move(contradiction)};
+    take_narrower(*plain, *informed);
+    return ArchivedEstimate{std::move(*informed), std::move(contradiction)};
 }
 
 }  // namespace thermbal

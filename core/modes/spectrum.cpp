@@ -70,6 +70,7 @@ ChannelEstimate channel_estimate(const SpectrumProblem& problem, const ObservedC
     ChannelEstimate channel;
     channel.channel = observed.name;
     channel.good_samples = data.good_samples;
+    channel.used_responses = observed.responses.cols() > 0;
     channel.noise_C = std::sqrt(data.sample_variance);
     channel.resolution_C = data.resolution_C;
     channel.residual_rms_C = data.residual_rms_C;

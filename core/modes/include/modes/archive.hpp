@@ -55,7 +55,8 @@ struct Contradiction {
 
 Contradiction contradiction_of(const SpectrumEstimate& with_archive, double allowed_mode_energy = 2.0);
 
-/// The estimate with the archive's prior, or, if the window contradicts it, without.
+/// The estimate with the archive's prior, on each channel the narrower of with and without; if the window
+/// contradicts the archive, without.
 struct ArchivedEstimate {
     SpectrumEstimate estimate;
     Contradiction contradiction;

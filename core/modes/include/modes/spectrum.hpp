@@ -111,6 +111,7 @@ struct ChannelEstimate {
     double slowest_time_constant_min =
         0.0;  ///< slowest that carries at least 5 % of this channel's amplitudes
     std::size_t good_samples = 0;
+    bool used_responses = false;       ///< archived responses of this channel took part
     std::vector<double> coefficients;  ///< posterior mean, for predict_curve
 };
 
