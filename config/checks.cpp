@@ -93,7 +93,9 @@ void check_lines(const Config& config, const ConfigTables& tables, Complaints& c
         double longest_s = 0.0;
         for (const UnitConfig& unit : config.units) {
             if (unit.line == i) {
-                longest_s += longest_unit_s(config.lines[i].link, plan_unit(unit.unit_id, unit.profile));
+                const LinkOptions& link = config.lines[i].link;
+                longest_s +=
+                    longest_unit_s(link, plan_unit(unit.unit_id, unit.profile, link.confirms_reads()));
             }
         }
         if (longest_s <= config.test.period_s) continue;

@@ -56,9 +56,11 @@ std::string explain_line(const LineConfig& line) {
                             link.transport == Transport::tcp ? "tcp" : "rtu_over_tcp", quoted(link.host),
                             link.port, milliseconds(link.connect_timeout_s));
     }
-    return text + fmt::format("response_timeout_ms = {}\nquiet_ms = {}\nreconnect_pause_ms = {}\n",
-                              milliseconds(link.response_timeout_s), milliseconds(link.quiet_s),
-                              milliseconds(link.longest_pause_s));
+    return text +
+           fmt::format(
+               "response_timeout_ms = {}\nquiet_ms = {}\nconfirm_reads = {}\nreconnect_pause_ms = {}\n",
+               milliseconds(link.response_timeout_s), milliseconds(link.quiet_s), link.confirm_reads,
+               milliseconds(link.longest_pause_s));
 }
 
 std::string as_comment(const std::string& text) {

@@ -190,6 +190,7 @@ class Loader {
         if (const auto ms = reader.number("response_timeout_ms", {1.0, 60'000.0}))
             link.response_timeout_s = *ms / 1000.0;
         if (const auto ms = reader.number("quiet_ms", {0.0, 1000.0})) link.quiet_s = *ms / 1000.0;
+        set(link.confirm_reads, reader.boolean("confirm_reads"));
         read_pause(reader, link);
     }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "acquisition/scan_thread.hpp"
+
 namespace thermbal {
 
 LineReader::LineReader(std::size_t index, Line& line, Clock& clock, Mailbox<LineScan>& mailbox)
@@ -45,6 +47,7 @@ void LineReader::carry_out_writes() {
 }
 
 void LineReader::run(const std::stop_token& stop) {
+    put_scan_thread_first();
     while (!stop.stop_requested()) {
         const std::uint64_t seen_wakes = clock_.wakes();
         carry_out_writes();

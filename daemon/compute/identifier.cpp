@@ -3,8 +3,7 @@
 #include <chrono>
 #include <utility>
 
-#include <sys/resource.h>
-#include <unistd.h>
+#include "compute/threads.hpp"
 
 namespace thermbal {
 
@@ -38,7 +37,7 @@ bool Identifier::busy() const {
 }
 
 void Identifier::run(const std::stop_token& stop) {
-    setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), 10);
+    put_this_thread_last();
     for (;;) {
         IdentificationJob job;
         std::uint64_t number = 0;

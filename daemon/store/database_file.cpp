@@ -79,7 +79,7 @@ Result<void> create_if_absent(const std::filesystem::path& database) {
     return {};
 }
 
-Result<bool> is_damaged(const std::filesystem::path& database, int busy_timeout_ms) {
+Result<bool> is_damaged(const std::filesystem::path& database, int busy_timeout_ms, bool all) {
     std::array<char, 16> header{};
     std::ifstream file(database, std::ios::binary);
     file.read(header.data(), header.size());
@@ -98,7 +98,7 @@ Result<bool> is_damaged(const std::filesystem::path& database, int busy_timeout_
         return std::unexpected(probe.error());
     }
     (*probe)->leave_wal_alone_on_close();
-    auto check = (*probe)->query("PRAGMA quick_check(1)");
+    auto check = (*probe)->query(all ? "PRAGMA quick_check(1)" : "SELECT 'ok', count(*) FROM sqlite_schema");
     const bool sound = check.next() && check.text(0) == "ok";
     if (auto status = check.status(); !status && status.error().next != NextStep::stop)
         return std::unexpected(status.error());
@@ -121,6 +121,23 @@ Result<std::filesystem::path> put_aside(const std::filesystem::path& database, M
     }
     sync_folder(database);
     return std::filesystem::path(target);
+}
+
+void remove_database(const std::filesystem::path& database) {
+    std::error_code ignored;
+    for (const char* suffix : {"", "-wal", "-shm", "-journal", ".lock"})
+        std::filesystem::remove(database.string() + suffix, ignored);
+}
+
+Result<void> put_in_place(const std::filesystem::path& database, const std::filesystem::path& place) {
+    std::error_code error;
+    std::filesystem::rename(database, place, error);
+    if (error)
+        return fail(NextStep::retry, fmt::format("database {}: cannot be renamed to {}: {}",
+                                                 database.string(), place.string(), error.message()));
+    remove_database(database);
+    sync_folder(place);
+    return {};
 }
 
 }  // namespace thermbal

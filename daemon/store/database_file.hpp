@@ -26,11 +26,17 @@ class WriterLock {
 /// Creates an empty file (mode 0640) with its folder entry on the disk; leaves an existing one alone.
 Result<void> create_if_absent(const std::filesystem::path& database);
 
-/// Whether pages or schema are damaged. Changes nothing. A file that is no SQLite database at all is
-/// `refuse_input`: it is probably somebody else's.
-Result<bool> is_damaged(const std::filesystem::path& database, int busy_timeout_ms);
+/// Whether the head, or with `all` any page or the schema is damaged. Changes nothing. A file that is no
+/// SQLite database at all is `refuse_input`: it is probably somebody else's.
+Result<bool> is_damaged(const std::filesystem::path& database, int busy_timeout_ms, bool all);
 
 /// Renames a database with its -wal and -shm to <name>.damaged-<time>; returns the new name.
 Result<std::filesystem::path> put_aside(const std::filesystem::path& database, Moment now);
+
+/// Removes a database that nobody needs, with all that lies beside it.
+void remove_database(const std::filesystem::path& database);
+
+/// Renames a closed database whose log is empty; what lay beside it is removed.
+Result<void> put_in_place(const std::filesystem::path& database, const std::filesystem::path& place);
 
 }  // namespace thermbal

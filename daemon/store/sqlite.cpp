@@ -20,6 +20,7 @@ NextStep next_step(int code) {
         case SQLITE_READONLY:
         case SQLITE_CANTOPEN:
         case SQLITE_NOMEM:
+        case SQLITE_INTERRUPT:
         case SQLITE_PROTOCOL:
             return NextStep::retry;
         case SQLITE_CONSTRAINT:
@@ -202,6 +203,10 @@ Result<std::int64_t> Database::integer(std::string_view sql) {
     const std::int64_t value = row.next() ? row.integer(0) : 0;
     if (auto status = row.status(); !status) return std::unexpected(status.error());
     return value;
+}
+
+void Database::interrupt() {
+    sqlite3_interrupt(handle_);
 }
 
 void Database::set_busy_timeout_ms(int milliseconds) {

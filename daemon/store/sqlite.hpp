@@ -95,6 +95,8 @@ class Database {
     Result<std::int64_t> integer(std::string_view sql);
 
     void set_busy_timeout_ms(int milliseconds);
+    /// Ends the statement under way with an error. Any thread.
+    void interrupt();
     std::int64_t last_insert_id() const;
     std::int64_t changes() const;  ///< rows that the last statement changed
     bool in_transaction() const;

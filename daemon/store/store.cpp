@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "database_file.hpp"
+#include "salvage.hpp"
 #include "schema.hpp"
 #include "sqlite.hpp"
 
@@ -18,6 +19,7 @@ struct Store::Parts {
     Reader reader;
     std::optional<std::filesystem::path> set_aside;
     int busy_timeout_ms;
+    bool checked;
 
     sqlite::Database& database() const { return *reader.database_; }
 };
@@ -66,8 +68,8 @@ Result<std::shared_ptr<sqlite::Database>> open_writing(const std::filesystem::pa
 }
 
 Result<std::optional<std::filesystem::path>> clear_damage(const std::filesystem::path& path, Moment now,
-                                                          const StoreOptions& options) {
-    auto damaged = is_damaged(path, options.busy_timeout_ms);
+                                                          const StoreOptions& options, bool all) {
+    auto damaged = is_damaged(path, options.busy_timeout_ms, all);
     if (!damaged) return std::unexpected(damaged.error());
     if (!*damaged) return std::optional<std::filesystem::path>{};
     if (!options.set_aside_damaged)
@@ -242,14 +244,45 @@ Store::~Store() {
 Result<Store> Store::open(const std::filesystem::path& path, Moment now, const StoreOptions& options) {
     auto lock = WriterLock::take(path);
     if (!lock) return std::unexpected(lock.error());
-    auto set_aside = clear_damage(path, now, options);
+    const bool check_all = size_of(path) <= options.checked_at_once_bytes;
+    auto set_aside = clear_damage(path, now, options, check_all);
     if (!set_aside) return std::unexpected(set_aside.error());
     if (auto created = create_if_absent(path); !created) return std::unexpected(created.error());
     auto database = open_writing(path, options.busy_timeout_ms);
     if (!database) return std::unexpected(database.error());
     if (auto migrated = migrate(**database); !migrated) return std::unexpected(migrated.error());
-    return Store(std::unique_ptr<Parts>(new Parts{std::move(*lock), Reader(std::move(*database)),
-                                                  std::move(*set_aside), options.busy_timeout_ms}));
+    return Store(
+        std::unique_ptr<Parts>(new Parts{std::move(*lock), Reader(std::move(*database)),
+                                         std::move(*set_aside), options.busy_timeout_ms, check_all}));
+}
+
+bool Store::checked() const {
+    return parts_->checked;
+}
+
+Result<std::filesystem::path> Store::begin_anew(const KnownTest& known, Moment now) {
+    const std::filesystem::path path = parts_->database().path();
+    const std::filesystem::path beside = path.string() + ".new";
+    remove_database(beside);
+    {
+        // Beside the damaged one until it is whole: a full disk or the end of the process changes nothing.
+        auto fresh = Store::open(beside, now, {.busy_timeout_ms = parts_->busy_timeout_ms});
+        if (!fresh) return std::unexpected(fresh.error());
+        if (auto salvaged = salvage(read(), *fresh, known, now); !salvaged)
+            return std::unexpected(salvaged.error());
+    }
+    if (size_of(beside.string() + "-wal") > 0)
+        return fail(NextStep::retry,
+                    fmt::format("database {}: its log could not be folded in", beside.string()));
+    parts_->database().leave_wal_alone_on_close();
+    auto aside = put_aside(path, now);
+    if (!aside) return aside;
+    if (auto moved = put_in_place(beside, path); !moved) return std::unexpected(moved.error());
+    auto database = open_writing(path, parts_->busy_timeout_ms);
+    if (!database) return std::unexpected(database.error());
+    parts_->reader = Reader(std::move(*database));
+    parts_->set_aside = *aside;
+    return aside;
 }
 
 const std::optional<std::filesystem::path>& Store::set_aside() const {
@@ -260,7 +293,7 @@ const Reader& Store::read() const {
     return parts_->reader;
 }
 
-Result<TestId> Store::begin_test(const TestRecord& test) {
+Result<TestId> Store::begin_test(const TestRecord& test, std::optional<TestId> wanted_id) {
     auto& database = parts_->database();
     auto open_test = read().open_test();
     if (!open_test) return std::unexpected(open_test.error());
@@ -270,12 +303,14 @@ Result<TestId> Store::begin_test(const TestRecord& test) {
                                 (*open_test)->record.name, to_string((*open_test)->state)));
     TestId id = 0;
     auto done = in_transaction(database, [&]() -> Result<void> {
-        if (auto inserted = database.run(
-                "INSERT INTO tests (name, machine, config_toml, version, period_s, keep_measuring, state, "
-                "started_wall_ns, started_monotonic_ns, boot_id) VALUES (?, ?, ?, ?, ?, ?, 'running', ?, ?, "
-                "?)",
-                test.name, test.machine, test.config_toml, test.version, test.period_s, test.keep_measuring,
-                test.started.wall_ns, test.started.monotonic_ns, test.boot_id);
+        if (auto inserted = database.run("INSERT INTO tests (id, name, machine, config_toml, version, "
+                                         "period_s, keep_measuring, state, "
+                                         "started_wall_ns, started_monotonic_ns, boot_id) VALUES (?, ?, ?, "
+                                         "?, ?, ?, ?, 'running', ?, ?, "
+                                         "?)",
+                                         wanted_id, test.name, test.machine, test.config_toml, test.version,
+                                         test.period_s, test.keep_measuring, test.started.wall_ns,
+                                         test.started.monotonic_ns, test.boot_id);
             !inserted)
             return inserted;
         id = database.last_insert_id();

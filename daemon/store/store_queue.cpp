@@ -125,8 +125,29 @@ void StoreQueue::retry_refused() {
     std::erase_if(refused_, [this](const Entry& entry) { return apply(entry).has_value(); });
 }
 
+bool StoreQueue::begin_anew(KnownTest known, Moment now) {
+    for (const Entry& entry : waiting_) {
+        if (entry.scan && entry.test == known.id)
+            known.before_scan = std::min(known.before_scan, entry.scan->scan);
+    }
+    const auto aside = store_.begin_anew(known, now);
+    if (!aside) {
+        note_failure(aside.error());
+        return false;
+    }
+    damaged_ = false;
+    news_.push_back(
+        {StorageNews::Kind::set_aside,
+         fmt::format("the database was damaged; it is kept as {}, and a new one goes on with what "
+                     "could be read of the running test: try `sqlite3 FILE .recover` on it",
+                     aside->string())});
+    flush();
+    return true;
+}
+
 void StoreQueue::note_failure(const Error& error) {
     problem_ = error.message;
+    damaged_ = damaged_ || error.next == NextStep::stop;
     if (std::exchange(away_, true)) return;
     late_scans_ = 0;
     news_.push_back(

@@ -37,6 +37,7 @@ void Daemon::take_scan(Scan& scan) {
         }
     }
     storage_.flush();
+    if (storage_.damaged()) leave_damaged_database();
     tell_storage_news();
     if (server_.counters().subscribers > 0) server_.publish("scan", channels_json().value_or(nullptr));
     if (!is_measuring(test_.state) || !identifying) settle(scan.scan);
@@ -44,6 +45,7 @@ void Daemon::take_scan(Scan& scan) {
 
 void Daemon::take_identification(IdentificationResult result) {
     if (result.generation != generation_ || !is_measuring(test_.state)) return;
+    if (result.window_end_scan <= test_.revised_until_scan) return settle(result.window_end_scan);
     identification_s_.add(result.seconds);
     test_.identification_s = result.seconds;
     if (!result.verdict) {

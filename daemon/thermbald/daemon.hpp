@@ -24,6 +24,7 @@
 #include "service/hooks.hpp"
 #include "service/socket_server.hpp"
 #include "statistics.hpp"
+#include "store/file_check.hpp"
 #include "store/store_queue.hpp"
 
 namespace thermbal {
@@ -65,6 +66,8 @@ class Daemon {
         std::int64_t last_scan = -1;
         std::optional<std::int64_t> identified_scan;  ///< newest window that was identified
         std::int64_t submitted_scan = 0;              ///< newest window given to the identifier
+        std::int64_t revised_until_scan =
+            -1;  ///< what was identified up to here saw samples taken back since
         double identification_s = 0.0;
         std::string end_reason;
         int stop_attempts = 0;
@@ -97,6 +100,7 @@ class Daemon {
 
     // Starting and resuming (tests.cpp).
     Result<TestId> start_test(const std::string& name, const std::string& machine);
+    TestRecord test_record(const std::string& name, const std::string& machine) const;
     void resume(ResumedTest resumed);
     void follow_grid(Grid grid, std::int64_t first_scan);
     void begin_window(double period_s);
@@ -113,6 +117,9 @@ class Daemon {
     void store_scan(const Scan& scan);
     void write(StoreQueue::Write write, std::string_view key = {});
     void tell_storage_news();
+    void leave_damaged_database();
+    void check_database();
+    void take_file_check(const Result<bool>& sound);
     void event(std::string_view kind, const std::string& message,
                const std::optional<std::string>& channel = {});
     ScanRecord record_of(const Scan& scan) const;
@@ -172,6 +179,9 @@ class Daemon {
         bool is_trouble;
     };
     Mailbox<LogLine> line_log_;
+    Mailbox<Result<bool>> file_checks_;
+    std::optional<FileCheck> file_check_;
+    std::optional<std::int64_t> left_database_ns_;  ///< when a damaged database was set aside, or that failed
     std::vector<std::unique_ptr<ModbusLine>> lines_;
     std::unique_ptr<Identifier> identifier_;            // its thread uses the mailboxes above
     std::vector<std::unique_ptr<LineReader>> readers_;  // last: their threads use lines and mailboxes

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <cstring>
 #include <utility>
@@ -30,8 +31,10 @@ Result<void> check(int code, std::string_view what) {
 Result<std::unique_ptr<Daemon>> Daemon::create(DaemonOptions options, Clock& clock) {
     const Config& config = options.config;
     // Nobody waits for a lock for longer than a scan may: what the store does not take now waits in memory.
+    const std::int64_t period_ns = std::llround(config.test.period_s * 1e9);
+    const std::int64_t real_period_ns = clock.real_ns_until(clock.monotonic_ns() + period_ns);
     const StoreOptions store_options{
-        .busy_timeout_ms = std::clamp(static_cast<int>(config.test.period_s * 1000.0 / 8.0), 50, 2000)};
+        .busy_timeout_ms = static_cast<int>(std::clamp<std::int64_t>(real_period_ns / 8'000'000, 10, 2000))};
     auto store = Store::open(config.store.path, {clock.wall_ns(), clock.monotonic_ns()}, store_options);
     if (!store) return std::unexpected(store.error());
     auto server = SocketServer::open(
@@ -127,6 +130,10 @@ Result<void> Daemon::attach() {
                  self.event(line.is_trouble ? "line_trouble" : "line_ok", line.message);
              }
          }},
+        {file_checks_.fd(),
+         [](Daemon& self) {
+             for (const Result<bool>& sound : self.file_checks_.take()) self.take_file_check(sound);
+         }},
         {server_.fd(), [](Daemon& self) { self.server_.dispatch(); }},
         {hooks_.fd(), [](Daemon& self) { self.hooks_.dispatch(); }},
     };
@@ -158,6 +165,10 @@ Result<void> Daemon::attach() {
 
 Result<void> Daemon::run() {
     auto resumed = storage_.store().resume();
+    if (!resumed && resumed.error().next == NextStep::stop) {
+        leave_damaged_database();
+        resumed = storage_.store().resume();
+    }
     if (!resumed) return std::unexpected(resumed.error());
     if (const auto& set_aside = storage_.store().set_aside()) {
         event("database_set_aside",
@@ -177,6 +188,7 @@ Result<void> Daemon::run() {
     notify_ready(is_measuring(test_.state) ? fmt::format("test {} is running", test_.id)
                                            : "no test is running");
     feed_watchdog();
+    check_database();
     const auto ended = check(sd_event_loop(loop_), "event loop");
     leave_nothing_unstored();
     notify_stopping(is_measuring(test_.state) ? "the running test goes on at the next start" : "");

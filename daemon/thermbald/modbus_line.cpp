@@ -48,7 +48,8 @@ ModbusLine::ModbusLine(const Config& config, std::size_t line, std::function<std
     for (std::size_t u = 0; u < config.units.size(); ++u) {
         const UnitConfig& unit = config.units[u];
         if (unit.line != line) continue;
-        ConfiguredUnit configured{.plan = plan_unit(unit.unit_id, unit.profile), .channels = {}};
+        const bool confirm = config.lines[line].link.confirms_reads();
+        ConfiguredUnit configured{.plan = plan_unit(unit.unit_id, unit.profile, confirm), .channels = {}};
         configured.input_is_wrong.assign(static_cast<std::size_t>(unit.profile.inputs), false);
         for (std::size_t c = 0; c < config.channels.size(); ++c) {
             const ChannelConfig& channel = config.channels[c];

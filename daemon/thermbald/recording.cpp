@@ -35,6 +35,48 @@ void Daemon::write(StoreQueue::Write write, std::string_view key) {
     storage_.write(std::move(write), key);
 }
 
+/// At once, not at the next start: a test runs for hours, and what a damaged file does not take has only the
+/// memory to wait in. Not again and again on a disk that spoils every file.
+void Daemon::leave_damaged_database() {
+    constexpr std::int64_t pause_ns = 600'000'000'000;
+    if (left_database_ns_ && real_monotonic_ns() - *left_database_ns_ < pause_ns) return;
+    left_database_ns_ = real_monotonic_ns();
+    KnownTest known;
+    if (test_.id > 0) {
+        known = {.id = test_.id,
+                 .record = test_record(test_.name, test_.machine),
+                 .state = test_.state,
+                 .reason = test_.end_reason,
+                 .before_scan = test_.last_scan + 1};
+        known.record.started = {test_.started_wall_ns, test_.grid.start_ns};
+    } else if (const auto open = storage_.store().read().open_test(); open && *open) {
+        known = {.id = (*open)->id,
+                 .record = (*open)->record,
+                 .state = (*open)->state,
+                 .reason = (*open)->stop_reason,
+                 .before_scan = (*open)->last_scan.value_or(-1) + 1};
+    }
+    storage_.begin_anew(std::move(known), now());
+}
+
+/// A large file was not read through before the first scan; it is, beside the scans.
+void Daemon::check_database() {
+    if (storage_.store().checked()) return;
+    file_check_.emplace(options_.config.store.path,
+                        [this](Result<bool> sound) { file_checks_.push(std::move(sound)); });
+}
+
+void Daemon::take_file_check(const Result<bool>& sound) {
+    file_check_.reset();
+    if (!sound) {
+        event("database_unchecked",
+              fmt::format("the database could not be looked through for damage: {}", sound.error().message));
+    } else if (!*sound) {
+        leave_damaged_database();
+        tell_storage_news();
+    }
+}
+
 void Daemon::tell_storage_news() {
     for (const StorageNews& news : storage_.take_news()) {
         switch (news.kind) {
@@ -46,6 +88,9 @@ void Daemon::tell_storage_news() {
                 break;
             case StorageNews::Kind::refused:
                 event("storage_refused", news.message);
+                break;
+            case StorageNews::Kind::set_aside:
+                event("database_set_aside", news.message);
                 break;
         }
     }

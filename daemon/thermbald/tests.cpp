@@ -28,7 +28,7 @@ std::string describe_source(const Config& config, const ChannelConfig& channel) 
 
 }  // namespace
 
-Result<TestId> Daemon::start_test(const std::string& name, const std::string& machine) {
+TestRecord Daemon::test_record(const std::string& name, const std::string& machine) const {
     const Config& config = options_.config;
     TestRecord record{.name = name,
                       .machine = machine,
@@ -45,6 +45,11 @@ Result<TestId> Daemon::start_test(const std::string& name, const std::string& ma
                                    channel.place, channel.required, describe_source(config, channel),
                                    describe(channel.calibration)});
     }
+    return record;
+}
+
+Result<TestId> Daemon::start_test(const std::string& name, const std::string& machine) {
+    const TestRecord record = test_record(name, machine);
     storage_.flush();
     if (!storage_.problem().empty()) {
         return fail(NextStep::retry,

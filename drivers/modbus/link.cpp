@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <random>
 #include <set>
 #include <string>
@@ -36,6 +37,16 @@ LinkOptions with_line_silence(LinkOptions options) {
 
 bool is_read(const Request& request) {
     return request.function == 3 || request.function == 4;
+}
+
+/// How many registers the probe before a read of `count` asks for: never as many, and not as many as the
+/// probes before it, whose own replies may be under way. Even numbers first, which are whole values of 16 as
+/// of 32 bits: there are modules that do not answer to half a value.
+int probe_length(int count, int earlier_probes) {
+    if (count <= 2) return earlier_probes % 2 == 0 ? 3 - count : 3;
+    const int even_lengths = (count - 1) / 2;
+    const int turn = earlier_probes % (count - 1);
+    return turn < even_lengths ? 2 * (turn + 1) : 2 * (turn - even_lengths) + 1;
 }
 
 /// The link's state machine: closed -> (pausing after a failed opening) -> open, and on an open RTU line
@@ -111,26 +122,7 @@ class ModbusLink final : public Link {
         if (rtu_framing()) {
             if (auto settled = settle(request); !settled) return std::unexpected(std::move(settled.error()));
         }
-        auto reply = exchange(request);
-        const bool confirm = options_.confirm_reads && rtu_framing() && is_read(request);
-        return reply && confirm ? confirmed(request, std::move(reply)) : reply;
-    }
-
-    /// Hands the reply on when the unit's next answer is the one to what is asked next.
-    Result<Registers> confirmed(const Request& request, Result<Registers> reply) {
-        const auto answer = exchange(end_of(request));
-        if (answer || answer.error().next == NextStep::retry) return reply;
-        return fail(NextStep::reopen_link,
-                    fmt::format("unit {}: the reading is not used, the check behind it failed: {}",
-                                request.unit_id, answer.error().message));
-    }
-
-    /// The last value of a block, of 16 or 32 bits: another length than the block and than a probe.
-    static Request end_of(Request request) {
-        const int count = request.count_or_value;
-        request.count_or_value = count == 2 ? 1 : 2;
-        request.address = std::max(0, request.address + count - request.count_or_value);
-        return request;
+        return exchange(request);
     }
 
     /// An open line to the device that is plugged in now.
@@ -197,8 +189,8 @@ class ModbusLink final : public Link {
     /// nothing older is under way. An exception is an answer, too.
     Result<void> probe(const Request& request) {
         Request other = request;
-        other.count_or_value = request.count_or_value == 1 ? 2 : 1;
-        if (other.address + other.count_or_value > 65536) --other.address;
+        other.count_or_value = probe_length(request.count_or_value, probes_[request.unit_id]++);
+        other.address = std::min(other.address, 65536 - other.count_or_value);
         const auto answer = exchange(other);
         if (!answer && answer.error().next != NextStep::retry) return std::unexpected(answer.error());
         units_in_doubt_.erase(request.unit_id);
@@ -250,6 +242,7 @@ class ModbusLink final : public Link {
     Wire wire_;
     LinkCounters counters_;
     std::set<int> units_in_doubt_;  ///< RTU framing: an old reply of these may still come
+    std::map<int, int> probes_;     ///< sent to each unit
     int last_unit_ = 0;
     Deadline quiet_until_{};  ///< not before this moment is a request sent after a doubt
     Deadline last_byte_{};

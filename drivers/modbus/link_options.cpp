@@ -69,8 +69,7 @@ double longest_call_s(const LinkOptions& options) {
     if (options.transport == Transport::tcp) return connect_s + options.response_timeout_s + slack_s;
     const double settle_s = 2.0 * options.response_timeout_s + 2.0 * options.quiet_s;
     const double exchange_s = options.response_timeout_s + options.quiet_s;
-    const double exchanges = options.confirm_reads ? 3.0 : 2.0;
-    return connect_s + settle_s + exchanges * exchange_s + slack_s;
+    return connect_s + settle_s + 2.0 * exchange_s + slack_s;
 }
 
 }  // namespace thermbal

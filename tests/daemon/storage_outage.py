@@ -1,11 +1,14 @@
 """The disk takes nothing for a while: a full file system, a lock of another program. The daemon goes on reading, says so
-once, and writes everything as soon as it can."""
+once, and writes everything as soon as it can. A database that turns out to be damaged while a test runs is set aside at once, and
+the test goes on in a new one."""
+import glob
+import os
 import pathlib
 import sqlite3
 import subprocess
 import tempfile
 
-from daemon_support import Daemon, Simulator, configuration, database, run, scratch, wait_until
+from daemon_support import Daemon, Simulator, configuration, control, database, run, scratch, wait_until
 
 SCALE = "150"  # a scan each 100 ms
 
@@ -69,5 +72,44 @@ def a_full_file_system():
             wait_until(lambda: subprocess.run(["umount", mount_point], capture_output=True).returncode == 0, "umount", 10)
 
 
+def weigh(path, mebibytes):
+    """More than is looked through before the first scan."""
+    with sqlite3.connect(path) as stored:
+        for _ in range(mebibytes):
+            stored.execute("INSERT INTO events (wall_ns, kind, message) VALUES (0, 'annotation', ?)", ("x" * 2**20,))
+    stored.close()
+
+
+def spoil_the_weight(path):
+    with open(path, "r+b") as file:
+        text = file.read()
+        place = text.rindex(b"x" * 4000)
+        file.seek(place - place % 4096 - 40 * 4096)
+        file.write(b"Z" * 4096)
+
+
+def a_damage_that_is_found_while_the_test_runs():
+    with scratch() as folder, Simulator("--time-scale", SCALE) as sim:
+        with start(folder, sim) as daemon:
+            daemon.wait_for("status", lambda s: s["test"] and s["test"]["scans"] > 20, "scans")
+        weigh(f"{folder}/test.db", 8)
+        spoil_the_weight(f"{folder}/test.db")
+        with start(folder, sim) as daemon:
+            wait_until(lambda: "database_set_aside" in daemon.log_text(), "the damage to be found")
+            status = daemon.call("status")
+            assert status["state"] == "running" and status["test"]["id"] == 1, status
+            daemon.wait_for("status", lambda s: s["test"]["scans"] > status["test"]["scans"] + 5, "the test to go on")
+        assert glob.glob(f"{folder}/test.db.damaged-*"), os.listdir(folder)
+        control("verify", "--database", f"{folder}/test.db")
+        with database(folder) as stored:
+            rows = [row[0] for row in stored.execute("SELECT scan FROM scans ORDER BY scan")]
+            kept = stored.execute("SELECT count(*) FROM scans WHERE scan < 20 AND status <> 'missed'").fetchone()[0]
+            good = stored.execute("SELECT count(*) FROM samples WHERE scan < 20 AND quality = 'good'").fetchone()[0]
+            kinds = [row[0] for row in stored.execute("SELECT kind FROM events ORDER BY id")]
+        assert rows == list(range(len(rows))) and len(rows) > 25, rows
+        assert kept > 15 and good == 16 * kept, (good, kept)
+        assert "started" in kinds and "resumed" in kinds, kinds
+
+
 if __name__ == "__main__":
-    run([a_lock_of_another_program, a_full_file_system])
+    run([a_lock_of_another_program, a_full_file_system, a_damage_that_is_found_while_the_test_runs])

@@ -67,18 +67,19 @@ Fault FaultDraw::draw(std::mt19937_64& random, double response_timeout_s) const 
     const FaultPlace place = fault.place();
     if (place == FaultPlace::sensor && !all) fault.channel = random() % 16;
     if ((place == FaultPlace::reply || place == FaultPlace::module) && !all) {
-        fault.unit = static_cast<std::uint8_t>(1 + random() % 2);
+        fault.unit = static_cast<std::uint8_t>(1 + random() % units);
     }
     return fault;
 }
 
-std::vector<FaultDraw> fault_draws(Transport transport) {
+std::vector<FaultDraw> fault_draws(Transport transport, std::size_t units) {
     const FaultFraming other = transport == Transport::tcp ? FaultFraming::rtu : FaultFraming::tcp;
     std::vector<FaultDraw> draws;
     for (const FaultEntry& entry : fault_catalogue()) {
         if (entry.framing == other) continue;
         std::ranges::copy(draws_of(entry), std::back_inserter(draws));
     }
+    for (FaultDraw& draw : draws) draw.units = units;
     return draws;
 }
 

@@ -19,11 +19,12 @@ struct FaultDraw {
     double fewest = 0.0;  ///< with most: a whole number between
     double most = 0.0;
     bool drops_connections = false;  ///< needs a hang-up besides to be noticed
+    std::size_t units = 2;           ///< on the line: one of them in two of three draws
 
     Fault draw(std::mt19937_64& random, double response_timeout_s) const;
 };
 
 /// Every fault of the catalogue that the transport knows; exceptions one by one.
-std::vector<FaultDraw> fault_draws(Transport transport);
+std::vector<FaultDraw> fault_draws(Transport transport, std::size_t units);
 
 }  // namespace thermbal::soak

@@ -20,9 +20,14 @@ std::uint64_t mixed(std::uint64_t x) {  // splitmix64
     return x ^ (x >> 31U);
 }
 
-std::vector<ModuleUnit> two_units() {
-    return {{.id = 1, .first_channel = 0, .channels = inputs_per_unit},
-            {.id = 2, .first_channel = inputs_per_unit, .channels = inputs_per_unit}};
+std::vector<ModuleUnit> units_of(const Layout& layout) {
+    std::vector<ModuleUnit> units;
+    for (std::size_t u = 0; u < layout.units; ++u) {
+        units.push_back({.id = static_cast<std::uint8_t>(u + 1),
+                         .first_channel = u * layout.inputs_per_unit(),
+                         .channels = layout.inputs_per_unit()});
+    }
+    return units;
 }
 
 template <typename T>
@@ -35,14 +40,16 @@ T checked(Result<T> result) {
 
 std::int16_t plant_word(std::uint64_t seed, std::int64_t scan, std::size_t channel) {
     constexpr std::uint64_t words = 10000;  // -150.0 ... 849.9 C: good for the generic profile
-    const std::uint64_t random = mixed(seed ^ mixed(static_cast<std::uint64_t>(scan) * channels + channel));
+    const std::uint64_t random =
+        mixed(seed ^ mixed(static_cast<std::uint64_t>(scan) * most_channels + channel));
     return static_cast<std::int16_t>(static_cast<int>(random % words) - 1500);
 }
 
-Rig::Rig(Transport transport, std::uint64_t seed)
+Rig::Rig(Transport transport, Layout layout, std::uint64_t seed)
     : transport_(transport),
+      layout_(layout),
       seed_(seed),
-      station_(ModbusModule(*find_register_map("int16"), two_units()),
+      station_(ModbusModule(*find_register_map("int16"), units_of(layout)),
                {.read_C = [this](double) { return measured_C(); }}, FaultPlan(), SimClock::scaled(1.0, 0),
                ForeignUnit::silence, {}, seed),
       turnaround_(seed),
@@ -122,10 +129,13 @@ EndpointState Rig::look(std::int64_t now_ns) {
 std::vector<Delivery> Rig::answer(Framing framing, const ModbusRequest& request, std::int64_t now_ns) {
     const std::lock_guard lock(mutex_);
     std::vector<Delivery> sent = station_.serve(framing, request, now_ns);
-    // A real module takes its time; a fault that comes meanwhile finds the exchange half done.
-    const double turnaround_s = std::uniform_real_distribution(0.0, 0.002)(turnaround_);
+    // A real module takes its time; a fault that comes meanwhile finds the exchange half done. It takes one
+    // request after the other: two that lay in the kernel while the host was busy are answered in order.
+    const std::int64_t turnaround_ns = std::uniform_int_distribution(0, 2'000'000)(turnaround_);
+    busy_until_ns_ = std::max(busy_until_ns_, now_ns) + turnaround_ns;
+    const double answered_after_s = static_cast<double>(busy_until_ns_ - now_ns) * 1e-9;
     double last_s = 0.0;
-    for (Delivery& delivery : sent) last_s = std::max(last_s, delivery.delay_s += turnaround_s);
+    for (Delivery& delivery : sent) last_s = std::max(last_s, delivery.delay_s += answered_after_s);
     if (!station_.plan().faults().empty()) {
         effect_until_ns_ = std::max(effect_until_ns_, now_ns + static_cast<std::int64_t>(last_s * 1e9));
     }
@@ -133,8 +143,8 @@ std::vector<Delivery> Rig::answer(Framing framing, const ModbusRequest& request,
 }
 
 std::vector<double> Rig::measured_C() const {
-    std::vector<double> values(channels);
-    for (std::size_t c = 0; c < channels; ++c) values[c] = plant_word(seed_, scan_, c) / 10.0;
+    std::vector<double> values(most_channels);
+    for (std::size_t c = 0; c < most_channels; ++c) values[c] = plant_word(seed_, scan_, c) / 10.0;
     return values;
 }
 

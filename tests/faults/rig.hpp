@@ -18,10 +18,15 @@
 
 namespace thermbal::soak {
 
-/// Two units of eight inputs each, ids 1 and 2, on one line.
-inline constexpr std::size_t units = 2;
-inline constexpr std::size_t inputs_per_unit = 8;
-inline constexpr std::size_t channels = units * inputs_per_unit;
+inline constexpr std::size_t most_channels = 16;
+
+/// So many units on one line, ids from 1 on, which share the simulator's 16 channels evenly.
+struct Layout {
+    std::size_t units = 2;
+
+    std::size_t inputs_per_unit() const { return most_channels / units; }
+    std::size_t channels() const { return units * inputs_per_unit(); }
+};
 
 /// The register of a channel at a scan: another one at every scan and on every channel, never a fault code. A
 /// word of another scan, channel or unit is seen as such.
@@ -31,11 +36,12 @@ std::int16_t plant_word(std::uint64_t seed, std::int64_t scan, std::size_t chann
 /// measuring plant_word at the scan that it is told. All members from any thread.
 class Rig {
   public:
-    Rig(Transport transport, std::uint64_t seed);
+    Rig(Transport transport, Layout layout, std::uint64_t seed);
     ~Rig();
     Rig(const Rig&) = delete;
     Rig& operator=(const Rig&) = delete;
 
+    const Layout& layout() const { return layout_; }
     /// Where it is to be found, with this response timeout.
     LinkOptions link_options(double response_timeout_s) const;
 
@@ -54,6 +60,7 @@ class Rig {
     std::vector<double> measured_C() const;
 
     const Transport transport_;
+    const Layout layout_;
     const std::uint64_t seed_;
     std::atomic<std::int64_t> scan_ = 0;
     std::atomic<std::uint64_t> faults_begun_ = 0;
@@ -61,6 +68,7 @@ class Rig {
     mutable std::mutex mutex_;
     Station station_;                   // guarded by mutex_
     std::mt19937_64 turnaround_;        // server thread
+    std::int64_t busy_until_ns_ = 0;    // server thread: when the newest request is answered
     EndpointState seen_;                // server thread: at the look before
     std::int64_t effect_until_ns_ = 0;  // server thread: when the last reply under a fault goes out
     std::unique_ptr<Server> server_;

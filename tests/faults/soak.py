@@ -15,7 +15,7 @@ import time
 
 SOAK = pathlib.Path(os.environ["THERMBAL_BIN_DIR"]).resolve().parent / "tests" / "fault_soak"
 SCANS_AN_HOUR = 240
-COLUMNS = [("fault", "fault"), ("line", "transport"), ("injections", "injections"), ("scans", "scans"),
+COLUMNS = [("fault", "fault"), ("line", "transport"), ("units", "units"), ("injections", "injections"), ("scans", "scans"),
            ("good values", "good_values"), ("wrong", "wrong_values"), ("hangs", "hangs"), ("late", "late_scans"),
            ("clean scans", "clean_scans"), ("not good", "late_recoveries"), ("host stalls", "host_stalls"),
            ("other unit lost", "lost_of_other_unit"), ("longest scan, ms", "longest_scan_ms"), ("bound, ms", "bound_ms")]
@@ -30,8 +30,9 @@ def faults_of(transport):
 def row(transport, fault, arguments, flags):
     with tempfile.TemporaryDirectory(prefix="thermbal-soak-", dir=arguments.scratch) as folder:
         done = subprocess.run([SOAK, "--transport", transport, "--fault", fault, "--folder", folder,
+                               "--units", str(arguments.units),
                                "--seed", str(arguments.seed), "--response-timeout-ms", str(arguments.timeout_ms),
-                               *(["--confirm"] if arguments.confirm else []), *flags],
+                               *(["--unconfirmed"] if arguments.unconfirmed else []), *flags],
                               capture_output=True, text=True, timeout=arguments.limit_s, check=False)
     sys.stderr.write(done.stderr)
     if not done.stdout:
@@ -68,7 +69,8 @@ def main():
     parser.add_argument("--hours", type=float, default=24.0, help="accelerated hours of the random mixture")
     parser.add_argument("--jobs", type=int, default=6, help="rows at a time: most of a row is waiting for timeouts")
     parser.add_argument("--timeout-ms", type=float, default=50.0, help="response timeout of the link")
-    parser.add_argument("--confirm", action="store_true", help="with LinkOptions::confirm_reads")
+    parser.add_argument("--unconfirmed", action="store_true", help="RTU without LinkOptions::confirm_reads")
+    parser.add_argument("--units", type=int, default=2, help="on the line; 1 to 4")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--transports", nargs="*", default=["tcp", "rtu"])
     parser.add_argument("--faults", nargs="*", help="only these")

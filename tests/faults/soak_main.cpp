@@ -28,8 +28,9 @@ struct Options {
     std::int64_t scans = 0;
     double response_timeout_ms = 50.0;
     std::uint64_t seed = 1;
+    Layout layout;
     std::string folder;
-    bool confirm = false;
+    bool unconfirmed = false;
     bool list = false;
 };
 
@@ -52,12 +53,12 @@ struct Counts {
 constexpr std::int64_t period_ns = 15'000'000'000;
 constexpr int hang_ms = 30'000;
 
-TestRecord test_record() {
+TestRecord test_record(const Layout& layout) {
     TestRecord record;
     record.name = "soak";
     record.boot_id = "soak";
     record.version = "soak";
-    for (std::size_t c = 0; c < channels; ++c) {
+    for (std::size_t c = 0; c < layout.channels(); ++c) {
         ChannelRecord channel;
         channel.name = fmt::format("T{}", c + 1);
         channel.role = "structure";
@@ -66,9 +67,10 @@ TestRecord test_record() {
     return record;
 }
 
-std::vector<WatchedModule> modules() {
-    std::vector<WatchedModule> watched(units);
-    for (std::size_t c = 0; c < channels; ++c) watched[c / inputs_per_unit].channels.push_back(c);
+std::vector<WatchedModule> modules(const Layout& layout) {
+    std::vector<WatchedModule> watched(layout.units);
+    for (std::size_t c = 0; c < layout.channels(); ++c)
+        watched[c / layout.inputs_per_unit()].channels.push_back(c);
     return watched;
 }
 
@@ -98,18 +100,18 @@ class Study {
   public:
     Study(const Options& options, Transport transport, std::vector<FaultDraw> draws)
         : options_(options),
-          rig_(transport, options.seed),
+          rig_(transport, options.layout, options.seed),
           line_(rig_, link_options(options)),
           injector_(rig_, std::move(draws), options.response_timeout_ms / 1000.0, options.seed),
           clock_(lockstep_clock(0, period_ns)),
           store_(or_exit(Store::open(options.folder + "/soak.db", {period_ns, 0}))),
-          test_(or_exit(store_.begin_test(test_record()))),
-          freeze_(modules()) {}
+          test_(or_exit(store_.begin_test(test_record(options.layout)))),
+          freeze_(modules(options.layout)) {}
 
     Counts run() {
         LineReader reader(0, line_, *clock_, mailbox_);
         const Grid grid{period_ns, period_ns};  // not from 0 on, which a fresh clock has settled already
-        ScanAssembler assembler(grid, 1, 0, std::vector<std::size_t>(channels, 0), 1);
+        ScanAssembler assembler(grid, 1, 0, std::vector<std::size_t>(options_.layout.channels(), 0), 1);
         reader.follow(grid, 1, 0);
         while (!enough()) {
             if (!wait_for_mail()) {
@@ -132,7 +134,7 @@ class Study {
   private:
     LinkOptions link_options(const Options& options) const {
         LinkOptions link = rig_.link_options(options.response_timeout_ms / 1000.0);
-        link.confirm_reads = options.confirm;
+        link.confirm_reads = !options.unconfirmed;
         return link;
     }
 
@@ -176,8 +178,11 @@ class Study {
 
     void note_other_unit(const Scan& scan) {
         if (line_.facts().clean || injector_.current().size() != 1 || !injector_.current()[0].unit) return;
-        const std::size_t other = *injector_.current()[0].unit == 1 ? inputs_per_unit : 0;
-        if (!scan.samples[other].good()) ++counts_.lost_of_other_unit;
+        const std::size_t faulty = *injector_.current()[0].unit - 1U;
+        for (std::size_t unit = 0; unit < options_.layout.units; ++unit) {
+            const Sample& sample = scan.samples[unit * options_.layout.inputs_per_unit()];
+            if (unit != faulty && !sample.good()) ++counts_.lost_of_other_unit;
+        }
     }
 
     static bool is_plants(std::uint64_t seed, std::int64_t scan, std::size_t channel, const Sample& sample) {
@@ -189,7 +194,7 @@ class Study {
     void note_frozen(const Scan& scan) {
         if (!injector_.has(FaultKind::frozen)) return;
         bool any = false;
-        for (std::size_t c = 0; c < channels; ++c) {
+        for (std::size_t c = 0; c < scan.samples.size(); ++c) {
             if (!scan.samples[c].good() || is_plants(options_.seed, scan.scan, c, scan.samples[c])) continue;
             frozen_.emplace_back(scan.scan, c);
             any = true;
@@ -198,17 +203,30 @@ class Study {
         counts_.longest_unnoticed = std::max(counts_.longest_unnoticed, unnoticed_);
     }
 
+    /// Where a wrong word comes from says how it came in.
+    void tell_wrong(std::int64_t scan, std::size_t channel, const Sample& sample) const {
+        std::string whence = "of no scan of this channel";
+        for (std::int64_t earlier = scan; earlier >= 0; --earlier) {
+            if (is_plants(options_.seed, earlier, channel, sample)) {
+                whence = fmt::format("the word of {} scans before", scan - earlier);
+                break;
+            }
+        }
+        fmt::print(stderr, "scan {}, channel {}: {} is wrong: {}\n", scan, channel, *sample.raw, whence);
+    }
+
     void check_stored() {
         const std::vector<ScanRecord> stored = or_exit(store_.read().scans(test_));
         if (static_cast<std::int64_t>(stored.size()) != counts_.scans) ++counts_.wrong_values;
         std::size_t frozen = 0;
         for (const ScanRecord& scan : stored) {
-            for (std::size_t c = 0; c < channels; ++c) {
+            for (std::size_t c = 0; c < scan.samples.size(); ++c) {
                 if (!scan.samples[c].good()) continue;
                 ++counts_.good_values;
                 if (is_plants(options_.seed, scan.scan, c, scan.samples[c])) continue;
                 const bool known = frozen < frozen_.size() && frozen_[frozen] == std::pair(scan.scan, c);
                 ++(known ? counts_.frozen_before_noticed : counts_.wrong_values);
+                if (!known) tell_wrong(scan.scan, c, scan.samples[c]);
                 if (known) ++frozen;
             }
         }
@@ -231,6 +249,7 @@ class Study {
 nlohmann::ordered_json json_of(const Options& options, const Counts& counts, double bound_s) {
     return {{"fault", options.fault},
             {"transport", options.transport},
+            {"units", options.layout.units},
             {"seed", options.seed},
             {"response_timeout_ms", options.response_timeout_ms},
             {"injections", counts.injections},
@@ -251,7 +270,7 @@ nlohmann::ordered_json json_of(const Options& options, const Counts& counts, dou
 
 int run(const Options& options) {
     const Transport transport = options.transport == "tcp" ? Transport::tcp : Transport::rtu;
-    std::vector<FaultDraw> draws = fault_draws(transport);
+    std::vector<FaultDraw> draws = fault_draws(transport, options.layout.units);
     if (options.list) {
         for (const FaultDraw& draw : draws) fmt::print("{}\n", draw.name);
         return 0;
@@ -285,12 +304,13 @@ int main(int argc, char** argv) {
         ->check(CLI::IsMember({"tcp", "rtu"}))
         ->capture_default_str();
     app.add_option("--fault", options.fault, "one of --list, or mixture")->capture_default_str();
+    app.add_option("--units", options.layout.units)->check(CLI::Range(1, 4))->capture_default_str();
     app.add_option("--times", options.times, "injections")->capture_default_str();
     app.add_option("--scans", options.scans, "end after so many scans instead");
     app.add_option("--response-timeout-ms", options.response_timeout_ms)->capture_default_str();
     app.add_option("--seed", options.seed)->capture_default_str();
     app.add_option("--folder", options.folder, "an empty one, for the database");
-    app.add_flag("--confirm", options.confirm, "LinkOptions::confirm_reads");
+    app.add_flag("--unconfirmed", options.unconfirmed, "without LinkOptions::confirm_reads");
     app.add_flag("--list", options.list, "the faults of the transport");
     CLI11_PARSE(app, argc, argv);
     return thermbal::soak::run(options);

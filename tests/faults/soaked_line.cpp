@@ -11,10 +11,10 @@ namespace thermbal::soak {
 namespace {
 
 /// As config/profiles/generic-8x-int16.toml.
-ModuleProfile profile() {
+ModuleProfile profile(const Layout& layout) {
     ModuleProfile generic;
     generic.name = "generic-8x-int16";
-    generic.inputs = inputs_per_unit;
+    generic.inputs = static_cast<int>(layout.inputs_per_unit());
     generic.faults = {{.first = 32767, .last = 32767, .quality = Quality::open},
                       {.first = -32768, .last = -32768, .quality = Quality::shorted}};
     return generic;
@@ -24,8 +24,8 @@ ModuleProfile profile() {
 
 SoakedLine::SoakedLine(Rig& rig, const LinkOptions& options)
     : rig_(rig), options_(options), link_(make_link(options)) {
-    for (int unit = 1; unit <= static_cast<int>(units); ++unit) {
-        plans_.push_back(plan_unit(unit, profile()));
+    for (int unit = 1; unit <= static_cast<int>(rig.layout().units); ++unit) {
+        plans_.push_back(plan_unit(unit, profile(rig.layout()), options.confirms_reads()));
         bound_s_ += longest_unit_s(options_, plans_.back());
     }
 }

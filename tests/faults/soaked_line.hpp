@@ -19,7 +19,7 @@ struct ScanFacts {
     std::string error;            ///< of the first unit that failed
 };
 
-/// Both units on one real link. Tells the rig which scan it is.
+/// All units of the rig on one real link. Tells the rig which scan it is.
 class SoakedLine final : public Line {
   public:
     SoakedLine(Rig& rig, const LinkOptions& options);

@@ -1,6 +1,7 @@
 #include "modbus/link.hpp"
 
 #include <chrono>
+#include <deque>
 #include <filesystem>
 #include <set>
 #include <string>
@@ -19,6 +20,7 @@
 #include <unistd.h>
 
 #include "backoff.hpp"
+#include "modbus/unit.hpp"
 #include "scripted_peer.hpp"
 #include "serial/ports.hpp"
 
@@ -143,6 +145,18 @@ TEST_P(LinkTest, PersistentlyLatePeerNeverGivesAReadingAndHealsWhenItGetsFaster)
     late = false;
     wait(300);
     EXPECT_TRUE(read()) << message_;
+}
+
+TEST_P(LinkTest, APeerThatIsAlwaysTwoRepliesBehindGivesNoReading) {
+    // The reply to an older probe must not pass for that to the newest one.
+    std::deque<Heard> owed;
+    start([&](const Heard& heard, const Send& send, const HangUp&) {
+        owed.push_back(heard);
+        if (owed.size() <= 2) return;
+        send(owed.front().right_reply());
+        owed.pop_front();
+    });
+    for (int i = 0; i < 12; ++i) EXPECT_FALSE(read(8 * (i % 3))) << i;
 }
 
 TEST_P(LinkTest, SilenceIsATimeoutWithinItsBound) {
@@ -475,6 +489,16 @@ TEST(LinkRtu, LineThatNeverFallsSilentKeepsTheBound) {
     EXPECT_TRUE(link->read_block(1, 3, 0, 8));
 }
 
+UnitPlan eight_inputs(bool confirm) {
+    ModuleProfile profile;
+    profile.inputs = 8;
+    return plan_unit(1, profile, confirm);
+}
+
+std::int64_t no_clock() {
+    return 0;
+}
+
 TEST(LinkRtu, ASoundFrameJustBeforeALateReplyIsNoReadingWhenReadsAreConfirmed) {
     for (const bool confirm : {false, true}) {
         ScriptedPeer peer(Transport::rtu, [](const Heard& heard, const Send& send, const HangUp&) {
@@ -486,36 +510,58 @@ TEST(LinkRtu, ASoundFrameJustBeforeALateReplyIsNoReadingWhenReadsAreConfirmed) {
             }
             send(heard.right_reply());
         });
-        LinkOptions options = peer.options();
-        options.confirm_reads = confirm;
-        const auto link = make_link(options);
-        const auto words = link->read_block(1, 3, 0, 8);
+        const auto link = make_link(peer.options());
+        const UnitReading reading = read_unit(*link, eight_inputs(confirm), no_clock);
         // Without the check there is nothing to tell the two by: this is what it is for.
-        ASSERT_EQ(words.has_value(), !confirm);
+        ASSERT_EQ(reading.error.has_value(), confirm);
         if (!confirm) continue;
-        EXPECT_EQ(words.error().next, NextStep::reopen_link);
+        EXPECT_EQ(reading.error->next, NextStep::reopen_link);
+        for (const Sample& sample : reading.samples) EXPECT_EQ(sample.quality, Quality::communication);
         wait(150);
-        const auto next = link->read_block(1, 3, 0, 8);
-        ASSERT_TRUE(next) << next.error().message;
-        EXPECT_EQ(next->front() / 1000, peer.requests() - 1) << "the reading, then its check";
+        const UnitReading next = read_unit(*link, eight_inputs(true), no_clock);
+        ASSERT_FALSE(next.error) << next.error->message;
+        EXPECT_EQ(next.samples[0].raw, (peer.requests() - 1) * 1000) << "the reading, then its check";
     }
 }
 
-TEST(LinkRtu, ConfirmedReadsKeepTheirBoundAndTakeAnExceptionForAnAnswer) {
-    std::atomic<bool> silent = false;
+TEST(LinkRtu, AFrameInFrontOfOneOfManyBlocksIsFoundOut) {
+    // One register a block: every later reply fits the next request.
+    ModuleProfile profile;
+    profile.inputs = 6;
+    profile.stride = 256;
+    ScriptedPeer peer(Transport::rtu, [](const Heard& heard, const Send& send, const HangUp&) {
+        if (heard.number == 2) {
+            Heard other = heard;
+            other.number = 40;
+            send(other.right_reply());
+            wait(50);
+        }
+        send(heard.right_reply());
+    });
+    const auto link = make_link(peer.options());
+    const UnitReading reading = read_unit(*link, plan_unit(1, profile, true), no_clock);
+    ASSERT_TRUE(reading.error);
+    for (const Sample& sample : reading.samples) EXPECT_FALSE(sample.good());
+}
+
+TEST(LinkRtu, AReadingIsNotUsedWhenWhatConfirmsItDoesNotCome) {
     ScriptedPeer peer(Transport::rtu, [&](const Heard& heard, const Send& send, const HangUp&) {
         if (heard.count() == 8) return send(heard.right_reply());
-        if (!silent) send(heard.exception(2));
+        if (heard.number < 5) send(heard.exception(2));
     });
-    LinkOptions options = peer.options();
-    options.confirm_reads = true;
-    const auto link = make_link(options);
+    const auto link = make_link(peer.options());
+    const UnitReading refused = read_unit(*link, eight_inputs(true), no_clock);
+    ASSERT_TRUE(refused.error);
+    EXPECT_THAT(refused.error->message, HasSubstr("confirm_reads = false"));
+    EXPECT_FALSE(refused.samples[0].raw);
+    UnitReading silent;
+    EXPECT_FALSE(read_unit(*link, eight_inputs(false), no_clock).error);
+    wait(20);
     EXPECT_TRUE(link->read_block(1, 3, 0, 8));
-    silent = true;
-    Result<std::vector<std::uint16_t>> words;
-    EXPECT_LE(took_s([&] { words = link->read_block(1, 3, 0, 8); }), longest_call_s(options));
-    ASSERT_FALSE(words);
-    EXPECT_THAT(words.error().message, HasSubstr("the reading is not used, the check behind it failed"));
+    EXPECT_LE(took_s([&] { silent = read_unit(*link, eight_inputs(true), no_clock); }),
+              longest_unit_s(peer.options(), eight_inputs(true)));
+    ASSERT_TRUE(silent.error);
+    EXPECT_FALSE(silent.samples[0].raw);
 }
 
 TEST(LinkRtu, PortOfAnotherProgramIsNamed) {

@@ -24,7 +24,8 @@ int main(int argc, char** argv) {
     profile.faults = {{.first = 32767, .last = 32767, .quality = Quality::open},
                       {.first = -32768, .last = -32768, .quality = Quality::shorted}};
     const auto link = make_link(options);
-    const UnitReading reading = read_unit(*link, plan_unit(std::atoi(argv[4]), profile), [] { return 0; });
+    const UnitReading reading =
+        read_unit(*link, plan_unit(std::atoi(argv[4]), profile, false), [] { return 0; });
     if (reading.error) {
         fmt::print(stderr, "{}\n", reading.error->message);
         return 1;

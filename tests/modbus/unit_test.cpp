@@ -1,5 +1,7 @@
 #include "modbus/unit.hpp"
 
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 namespace thermbal {
@@ -58,6 +60,32 @@ TEST(Plan, CoversEveryInputOnceWithinTheLimit) {
     }
 }
 
+TEST(Plan, TheConfirmingReadHasALengthThatNoBlockHas) {
+    for (const RegisterType type : {RegisterType::int16, RegisterType::float32}) {
+        for (const int inputs : {1, 2, 3, 8, 11, 16, 63, 126, 127, 250}) {
+            for (const int stride : {2, 3, 62, 124, 256}) {
+                ModuleProfile profile;
+                profile.inputs = inputs;
+                profile.type = type;
+                profile.stride = stride;
+                const UnitPlan plan = plan_unit(1, profile, true);
+                ASSERT_TRUE(plan.confirming);
+                EXPECT_GE(plan.confirming->first, 0);
+                EXPECT_LE(plan.confirming->first + plan.confirming->count, 65536);
+                for (const BlockRead& block : plan.blocks) EXPECT_NE(block.count, plan.confirming->count);
+                const bool whole_values = std::ranges::any_of(plan.blocks, [&](const BlockRead& block) {
+                    const int last = block.first + block.count;
+                    return plan.confirming->first >= block.first &&
+                           plan.confirming->first + plan.confirming->count == last &&
+                           (plan.confirming->first - block.first) % stride == 0;
+                });
+                EXPECT_EQ(whole_values, !plan.confirming->may_be_refused) << inputs << " " << stride;
+                EXPECT_FALSE(plan_unit(1, profile, false).confirming);
+            }
+        }
+    }
+}
+
 TEST(ReadUnit, EveryInputFromItsOwnRegister) {
     ModuleProfile profile;
     profile.function = 4;
@@ -66,7 +94,7 @@ TEST(ReadUnit, EveryInputFromItsOwnRegister) {
     profile.first_register = 100;
     CountingLink link;
     std::int64_t clock = 0;
-    const UnitReading reading = read_unit(link, plan_unit(1, profile), [&] { return ++clock; });
+    const UnitReading reading = read_unit(link, plan_unit(1, profile, false), [&] { return ++clock; });
     EXPECT_EQ(link.calls.size(), 3U);
     EXPECT_EQ(link.calls[0].function, 4);
     EXPECT_FALSE(reading.error);
@@ -82,7 +110,7 @@ TEST(ReadUnit, AFailureLeavesNoNumberBehind) {
     profile.stride = 4096;
     CountingLink link;
     link.fails_at = 4;
-    const UnitReading reading = read_unit(link, plan_unit(1, profile), no_clock);
+    const UnitReading reading = read_unit(link, plan_unit(1, profile, false), no_clock);
     EXPECT_EQ(link.calls.size(), 4U);
     ASSERT_TRUE(reading.error);
     EXPECT_EQ(reading.error->next, NextStep::reopen_link);

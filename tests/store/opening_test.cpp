@@ -1,6 +1,7 @@
 #include <array>
 #include <cstdio>
 #include <fstream>
+#include <future>
 #include <memory>
 
 #include <fcntl.h>
@@ -9,6 +10,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "store/file_check.hpp"
 #include "store/store.hpp"
 #include "support.hpp"
 
@@ -31,6 +33,20 @@ std::string output_of(const std::string& command) {
     while (const auto count = fread(buffer.data(), 1, buffer.size(), pipe.get()))
         text.append(buffer.data(), count);
     return text;
+}
+
+std::vector<ScanRecord> scan_records(std::int64_t count) {
+    std::vector<ScanRecord> records;
+    for (std::int64_t k = 0; k < count; ++k) records.push_back(scan_record(k));
+    return records;
+}
+
+void spoil(const std::filesystem::path& path, int first_page, int end_page) {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    for (int page = first_page; page < end_page; ++page) {
+        file.seekp(page * 4096);
+        file << std::string(4096, '\x5a');
+    }
 }
 
 TEST_F(OpeningTest, TheDatabaseIsDurableStrictAndNotForEveryone) {
@@ -162,13 +178,7 @@ TEST_F(OpeningTest, ADamagedDatabaseIsSetAsideWhole) {
         const auto id = store.begin_test(test_record());
         for (std::int64_t k = 0; k < 200; ++k) ASSERT_OK(store.append_scan(*id, scan_record(k)));
     }
-    {
-        std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
-        for (int page = 10; page < 14; ++page) {
-            file.seekp(page * 4096);
-            file << std::string(4096, '\x5a');
-        }
-    }
+    spoil(path, 10, 14);
     const auto damaged = contents(path);
     const auto kept = Store::open(path, start, {.set_aside_damaged = false});
     ASSERT_FALSE(kept);
@@ -180,6 +190,93 @@ TEST_F(OpeningTest, ADamagedDatabaseIsSetAsideWhole) {
     EXPECT_THAT(store.set_aside()->string(), HasSubstr("thermbal.db.damaged-20231114T221320Z"));
     EXPECT_EQ(contents(*store.set_aside()), damaged);
     EXPECT_THAT(*store.read().tests(), IsEmpty());
+}
+
+TEST_F(OpeningTest, ALargeDatabaseIsOpenedFirstAndCheckedBesideTheScans) {
+    {
+        auto store = open_store(path);
+        const auto id = store.begin_test(test_record());
+        ASSERT_OK(store.append_scans(*id, scan_records(200)));
+        EXPECT_TRUE(store.checked());
+    }
+    const auto checked = [&] {
+        std::promise<Result<bool>> sound;
+        const FileCheck check(path, [&](Result<bool> found) { sound.set_value(std::move(found)); });
+        return sound.get_future().get();
+    };
+    const auto store = Store::open(path, start, {.checked_at_once_bytes = 4096});
+    ASSERT_OK(store);
+    EXPECT_FALSE(store->checked());
+    const auto sound = checked();
+    ASSERT_OK(sound);
+    EXPECT_TRUE(*sound);
+    spoil(path, 20, 24);
+    const auto spoilt = checked();
+    ASSERT_OK(spoilt);
+    EXPECT_FALSE(*spoilt);
+}
+
+TEST_F(OpeningTest, ATestGoesOnInANewDatabaseWithWhatCanBeRead) {
+    constexpr std::int64_t scans = 1500;
+    TestId id = 0;
+    {
+        auto store = open_store(path);
+        ASSERT_OK(store.begin_test(test_record()));
+        ASSERT_OK(store.set_state(1, TestState::stopped, start, "an earlier test"));
+        id = *store.begin_test(test_record());
+        ASSERT_OK(store.append_scans(id, scan_records(scans)));
+        EventRecord door;
+        door.test_id = id;
+        door.kind = "annotation";
+        door.message = "door open";
+        ASSERT_OK(store.record_event(door));
+        ASSERT_OK(store.record_archive({.machine = "VMC 850", .test_id = 1}));
+    }
+    const auto pages = static_cast<int>(std::filesystem::file_size(path) / 4096);
+    spoil(path, pages / 2, pages / 2 + 3);
+    auto opened = Store::open(path, start, {.checked_at_once_bytes = 4096});
+    ASSERT_OK(opened);
+    Store store = std::move(*opened);
+    const auto aside =
+        store.begin_anew({.id = id, .record = test_record(), .reason = {}, .before_scan = scans + 1}, start);
+    ASSERT_OK(aside);
+    EXPECT_TRUE(std::filesystem::exists(*aside));
+    EXPECT_FALSE(std::filesystem::exists(path.string() + ".new"));
+
+    const auto open = store.read().open_test();
+    ASSERT_OK(open);
+    ASSERT_TRUE(*open);
+    EXPECT_EQ((*open)->id, id);
+    const auto kept = store.read().scans(id);
+    ASSERT_OK(kept);
+    ASSERT_EQ(kept->size(), static_cast<std::size_t>(scans) + 1) << "the last one was not given to it yet";
+    std::int64_t lost = 0;
+    for (const ScanRecord& scan : *kept) {
+        if (scan.status == ScanStatus::missed) {
+            ++lost;
+            continue;
+        }
+        for (std::size_t c = 0; c < scan.samples.size(); ++c)
+            ASSERT_EQ(scan.samples[c].value_C, value_C(scan.scan, c));
+    }
+    EXPECT_GT(lost, 0) << "three pages are gone";
+    EXPECT_LT(lost, scans / 2);
+    EXPECT_EQ(store.read().events(id)->size(), 1U);
+    EXPECT_EQ(store.read().archive("VMC 850")->size(), 1U);
+    ASSERT_OK(store.append_scan(id, scan_record(scans + 1)));
+    EXPECT_THAT(findings_text(*store.read().verify()), IsEmpty());
+}
+
+TEST_F(OpeningTest, WhereNoNewDatabaseCanBeMadeTheOldOneStays) {
+    auto store = open_store(path);
+    const auto id = *store.begin_test(test_record());
+    ASSERT_OK(store.append_scan(id, scan_record(0)));
+    std::filesystem::create_directory(path.string() + ".new");
+    std::ofstream(path.string() + ".new/in_the_way") << "x";
+    ASSERT_FALSE(
+        store.begin_anew({.id = id, .record = test_record(), .reason = {}, .before_scan = 1}, start));
+    ASSERT_OK(store.append_scan(id, scan_record(1)));
+    EXPECT_EQ(store.read().scans(id)->size(), 2U);
 }
 
 TEST_F(OpeningTest, OtherProgramsReadIt) {

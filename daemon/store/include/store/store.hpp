@@ -26,6 +26,18 @@ struct ResumedTest {
 struct StoreOptions {
     int busy_timeout_ms = 2000;     ///< how long a call waits for another program's lock before `retry`
     bool set_aside_damaged = true;  ///< a damaged file is renamed and a new one begun; otherwise `stop`
+    /// A larger file is not read through before it is opened: a restart in a test must not cost scans. Its
+    /// owner checks it beside the scans (FileCheck).
+    std::uintmax_t checked_at_once_bytes = 4 * 1024 * 1024;
+};
+
+/// What the daemon knows of its latest test without asking the database. id 0: there is none.
+struct KnownTest {
+    TestId id = 0;
+    TestRecord record;
+    TestState state = TestState::running;
+    std::string reason;            ///< of the state
+    std::int64_t before_scan = 0;  ///< scans from here on were not given to the database yet
 };
 
 /// The one writing connection of a database: WAL, synchronous = FULL. Every call that writes is one
@@ -44,11 +56,20 @@ class Store {
     /// Where the damaged database that was found went, if one was.
     const std::optional<std::filesystem::path>& set_aside() const;
 
+    /// Whether all of the file was looked through for damage when it was opened.
+    bool checked() const;
+
+    /// The database turned out to be damaged: it is renamed, and a new one takes its place with the test, of
+    /// its scans those that can still be read (the others are missed ones), and what the archive says of the
+    /// machines. The test keeps its id. Takes as long as writing the test again. Returns the new name of the
+    /// damaged file. After an error all is as it was before.
+    Result<std::filesystem::path> begin_anew(const KnownTest& known, Moment now);
+
     /// All queries, on this connection.
     const Reader& read() const;
 
-    /// Refused while another test is open.
-    Result<TestId> begin_test(const TestRecord& test);
+    /// Refused while another test is open. Without an id it gets the next one.
+    Result<TestId> begin_test(const TestRecord& test, std::optional<TestId> wanted_id = {});
 
     /// Acknowledged means on the disk. `scan` is above the last one stored, or fills a hole. The very scan
     /// that is already there (same times and status: a repetition after a doubtful error) is acknowledged

@@ -22,7 +22,7 @@ struct StoreQueueLimits {
 
 /// Something about the storage that a person should know: said once, not at every attempt.
 struct StorageNews {
-    enum class Kind : std::uint8_t { away, back, refused };
+    enum class Kind : std::uint8_t { away, back, refused, set_aside };
     Kind kind = Kind::away;
     std::string message;
 };
@@ -40,6 +40,12 @@ class StoreQueue {
     /// A write of any kind. With a key, it takes the place of one that waits with the same key: of what is
     /// only of interest in its newest state, an outage keeps only that.
     void write(Write write, std::string_view key = {});
+
+    /// The database turned out to be damaged: goes on in a new one with what can still be read of the test
+    /// (Store::begin_anew) and what waits here. True when that was done; else it is to be tried again later.
+    bool begin_anew(KnownTest known, Moment now);
+    /// The database said of itself that it is damaged.
+    bool damaged() const { return damaged_; }
 
     /// Tries to write what waits. After a failure the rest waits for the next call: call it once a scan.
     void flush();
@@ -92,6 +98,7 @@ class StoreQueue {
     std::uint64_t lost_scans_ = 0;
     std::uint64_t flushes_ = 0;
     bool away_ = false;
+    bool damaged_ = false;
     std::string problem_;
     std::vector<StorageNews> news_;
 };

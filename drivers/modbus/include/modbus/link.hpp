@@ -32,10 +32,10 @@ struct LinkOptions {
     double connect_timeout_s = 1.0;  ///< name resolution and connection together
     double quiet_s = 0.02;           ///< rtu: silence asked for before a request and after a reply
 
-    /// rtu framing: every block that was read is followed by a read of its last registers. A unit answers in
-    /// order, so when that is answered next, nothing else was under way: a sound frame that nobody asked for,
-    /// arriving just before a reply that is late, is then no reading. Costs one short exchange a block.
-    bool confirm_reads = false;
+    /// rtu framing: the reads of a unit are followed by a short one of another length, and count only when
+    /// that is what is answered next (modbus/unit.hpp). Over TCP the transaction id says as much.
+    bool confirm_reads = true;
+    bool confirms_reads() const { return confirm_reads && transport != Transport::tcp; }
 
     /// After an opening that failed, calls fail at once for a while: doubling from the first to the longest
     /// pause, with jitter. Shorter than the time between two scans, or the first one after a fault is lost.

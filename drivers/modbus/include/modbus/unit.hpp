@@ -24,18 +24,31 @@ struct BlockRead {
 /// The fewest reads of at most 125 registers that cover the inputs; an input never straddles two reads.
 std::vector<BlockRead> plan_blocks(const ModuleProfile& profile);
 
+/// The read behind the blocks of a unit that shows that their replies were theirs. RTU has no transaction
+/// id: a sound frame that was under way (an older reply, one that nobody asked for) passes for the reply to a
+/// block, and every reply behind it is then taken for that of the request after its own. A unit answers in
+/// order, so the reply to a last request of a length that no block has cannot be mistaken: when it comes
+/// next, no reply was out of place.
+struct ConfirmingRead {
+    int first = 0;
+    int count = 0;
+    /// The module may not have these registers (no block holds two values): an exception is an answer, too.
+    bool may_be_refused = false;
+};
+
 /// What is read of one unit at every scan. Plain data; make it once with plan_unit.
 struct UnitPlan {
     int unit_id = 1;
     ModuleProfile profile;
     std::vector<BlockRead> blocks;
+    std::optional<ConfirmingRead> confirming;
 };
 
-UnitPlan plan_unit(int unit_id, ModuleProfile profile);
+UnitPlan plan_unit(int unit_id, ModuleProfile profile, bool confirm);
 
 /// One unit at one scan: a sample an input, always profile.inputs of them. With an error (of the first block
 /// that failed) the inputs of the failed and the following blocks are Quality::communication without a raw
-/// register.
+/// register; all inputs are where the blocks are confirmed and any doubt came up.
 struct UnitReading {
     std::vector<Sample> samples;
     std::optional<Error> error;
