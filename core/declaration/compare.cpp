@@ -124,6 +124,59 @@ Answers modes_with_archive(const EstimatorInput& input) {
                                      input.options.spectrum, input.options.seed, input.start_level_C));
 }
 
+/// What the curve leaves of a channel, as means over `scans` scans; NaN where there is no good sample.
+std::vector<double> residual_means_C(const Column& column, const std::vector<double>& curve_C,
+                                     std::size_t scans) {
+    std::vector<double> means_C;
+    for (std::size_t first = 0; first + scans <= column.values.size(); first += scans) {
+        double sum_C = 0.0;
+        std::size_t good = 0;
+        for (std::size_t k = first; k < first + scans; ++k) {
+            if (!std::isfinite(column.values[k])) continue;
+            sum_C += column.values[k] - curve_C[k];
+            ++good;
+        }
+        means_C.push_back(good > 0 ? sum_C / static_cast<double>(good) : no_value);
+    }
+    return means_C;
+}
+
+/// The shared modes say where physics goes; an SVR on minute means of what they leave over says where that
+/// goes: to some small value where it has found a pattern, nowhere (no correction) where its free run does
+/// not settle.
+Answers modes_and_svr(const EstimatorInput& input) {
+    constexpr double block_s = 60.0;
+    constexpr std::size_t most_lags = 10;
+    const auto estimate = estimate_spectrum(input.window, input.options.ambient, std::nullopt,
+                                            input.options.spectrum, input.options.seed, input.start_level_C);
+    if (!estimate) return of_spectrum(input, std::unexpected(estimate.error()));
+    FlowOptions options = input.options;
+    options.sweep.last_lag = most_lags;
+    const TestWindow window = without_outliers(input.window, options.outliers);
+    const auto scans = static_cast<std::size_t>(std::max(1.0, std::round(block_s / window.period_s)));
+    std::vector<double> time_s(window.scans);
+    for (std::size_t k = 0; k < window.scans; ++k)
+        time_s[k] = window.start_s + static_cast<double>(k) * window.period_s;
+    Answers answers = of_spectrum(input, ArchivedEstimate{*estimate, {}});
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+        const auto found =
+            std::ranges::find(estimate->channels, input.channels[i], &ChannelEstimate::channel);
+        if (found == estimate->channels.end()) continue;
+        const auto curve_C = predict_curve(*estimate, *found, input.window, input.options.ambient, time_s);
+        const auto left_C = residual_means_C(*window.channel(input.channels[i]), curve_C, scans);
+        const auto swept = sweep_channel(left_C, window.start_s, static_cast<double>(scans) * window.period_s,
+                                         options, input.parallel_for, never_cancelled);
+        if (!swept || std::isnan(swept->svr.steady_state_C)) {
+            answers[i].note = "no pattern in what the shared modes leave over";
+            continue;
+        }
+        answers[i].steady_state_C += swept->svr.steady_state_C;
+        answers[i].steady_state_low_C += swept->svr.steady_state_C;
+        answers[i].steady_state_high_C += swept->svr.steady_state_C;
+    }
+    return answers;
+}
+
 constexpr std::array estimators{
     Estimator{"svr", "support-vector regression of the paper, literal", false, svr},
     Estimator{"one_exponential", "least squares, one exponential a channel", false, one_exponential},
@@ -131,7 +184,9 @@ constexpr std::array estimators{
     Estimator{"kalman", "adaptive unscented Kalman filter, a fast and a slow exponential a channel", false,
               kalman},
     Estimator{"modes", "time constants shared by all channels", false, modes},
-    Estimator{"modes_with_archive", "the same, with earlier tests of the machine", true, modes_with_archive},
+    Estimator{"modes_and_svr", "the same, and an SVR on what they leave over", false, modes_and_svr},
+    Estimator{"modes_with_archive", "shared time constants, with earlier tests of the machine", true,
+              modes_with_archive},
 };
 
 }  // namespace

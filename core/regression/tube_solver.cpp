@@ -148,15 +148,57 @@ void TubeSolver::direction_in_feature_space(double curvature) {
 void TubeSolver::direction_in_row_space(double curvature) {
     const Index rank = features_.cols();
     const Index rows = bent_.cols();
-    by_feature_.setZero(padded(rows), rank);
-    by_feature_.topRows(rows) = bent_.topRows(rank).transpose();
-    auto system = square_of(by_feature_, rows);
-    system.diagonal().array() += 1.0 / curvature;
+    bring_row_gram_up_to_date();
+    square_ = row_gram_;
+    square_.diagonal().array() += 1.0 / curvature;
+    Eigen::Ref<MatrixXd> system(square_);
     const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(system);
-    const VectorXd without_bias = factor.solve(-(by_feature_.topRows(rows) * gradient_));
+    const auto bent = bent_.topRows(rank);
+    const VectorXd without_bias = factor.solve(-(bent.transpose() * gradient_));
     const VectorXd of_bias = factor.solve(VectorXd::Ones(rows));
     bias_direction_ = (-bias_gradient_ - without_bias.sum()) / of_bias.sum();
-    direction_ = -gradient_ - bent_.topRows(rank) * (without_bias + bias_direction_ * of_bias);
+    direction_ = -gradient_ - bent * (without_bias + bias_direction_ * of_bias);
+}
+
+/// The inner products of the bending rows, lower triangle. From one step to the next few rows begin or cease
+/// to bend: the products of those that stay are kept.
+void TubeSolver::bring_row_gram_up_to_date() {
+    const Index rank = features_.cols();
+    const auto rows = static_cast<Index>(bending_.size());
+    kept_.clear();
+    fresh_.clear();
+    for (Index k = 0, old = 0; k < rows; ++k) {
+        const Index row = bending_[static_cast<std::size_t>(k)];
+        while (old < static_cast<Index>(gram_rows_.size()) && gram_rows_[static_cast<std::size_t>(old)] < row)
+            ++old;
+        const bool stays =
+            old < static_cast<Index>(gram_rows_.size()) && gram_rows_[static_cast<std::size_t>(old)] == row;
+        if (stays) {
+            kept_.emplace_back(k, old);
+        } else {
+            fresh_.push_back(k);
+        }
+    }
+    if (2 * fresh_.size() > bending_.size()) {
+        by_feature_.setZero(padded(rows), rank);
+        by_feature_.topRows(rows) = bent_.topRows(rank).transpose();
+        row_gram_ = square_of(by_feature_, rows);
+    } else {
+        new_gram_.resize(rows, rows);
+        for (const auto& [column, old_column] : kept_) {
+            for (const auto& [row, old_row] : kept_) {
+                if (row >= column) new_gram_(row, column) = row_gram_(old_row, old_column);
+            }
+        }
+        const auto bent = bent_.topRows(rank);
+        for (const Index k : fresh_) {
+            const VectorXd products = bent.transpose() * bent.col(k);
+            new_gram_.row(k).head(k + 1) = products.head(k + 1).transpose();
+            new_gram_.col(k).tail(rows - k) = products.tail(rows - k);
+        }
+        std::swap(row_gram_, new_gram_);
+    }
+    gram_rows_ = bending_;
 }
 
 /// The lower triangle of the sum of v v' over the columns v of `vectors`, without the padding.

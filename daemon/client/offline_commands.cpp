@@ -68,7 +68,7 @@ void add_offline_commands(CLI::App& app, int& status) {
         ->check(CLI::Range(0.01, 1e6));
     compare_command.add_option("--estimator", compare->estimators,
                                "only this one, several times for several: svr (slow), one_exponential, "
-                               "two_exponentials, kalman, modes, modes_with_archive");
+                               "two_exponentials, kalman, modes, modes_and_svr, modes_with_archive");
     compare_command.add_option("--plot", compare->plot, "draw the errors into this .html or .svg");
     compare_command.callback([&status, compare] { status = run_compare(*compare); });
 

@@ -43,7 +43,7 @@ struct Estimator {
     std::vector<EstimatorAnswer> (*answer)(const EstimatorInput& input);
 };
 
-/// All there are: svr, one_exponential, two_exponentials, kalman, modes, modes_with_archive.
+/// All there are: svr, one_exponential, two_exponentials, kalman, modes, modes_and_svr, modes_with_archive.
 std::span<const Estimator> all_estimators();
 
 struct ComparedWindow {
