@@ -1,11 +1,17 @@
 #!/usr/bin/env bash
-# Checks beyond the tests: tests/check.sh style|tidy|asan|tsan|fuzz [SECONDS] ...
-#   style  clang-format on every source
-#   tidy   clang-tidy on every source (about 15 min on 2 cores)
-#   asan   the C++ tests and the programs under AddressSanitizer and UndefinedBehaviorSanitizer
-#   tsan   what has threads under ThreadSanitizer
-#   fuzz   what reads bytes from outside under libFuzzer, AddressSanitizer and UndefinedBehaviorSanitizer, so many seconds
-#          a target (10), two targets at a time
+# Checks beyond the tests: tests/check.sh CHECK ...
+#   style        clang-format on every source
+#   tidy         clang-tidy on every source (about 15 min on 2 cores; what passed once is remembered)
+#   tidy-changed clang-tidy on what differs from the commit before, or from $THERMBAL_BASE
+#   clang        the programs by clang
+#   asan         the C++ tests of what bytes from outside reach, under AddressSanitizer and UndefinedBehaviorSanitizer, with the
+#                lines that they cover
+#   tsan         what has threads under ThreadSanitizer
+#   fuzz [SECONDS]  what reads bytes from outside under libFuzzer and the sanitizers, so many seconds a target (10), two at a time
+#   coverage     the lines that all C++ tests cover
+#   packages     the Debian packages: lintian, and as root everything in a clean Debian root
+#   nightly      all that is too long for every change: tidy, clang with its tests, coverage, fuzz for 10 min a target, packages,
+#                a reproducible build, clients against scans, and a soak of some days
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -18,6 +24,13 @@ build() {  # preset, targets...
     cmake --build --preset "$preset" --target "$@"
 }
 
+covered() {  # preset, rooms... : the share of their lines and branches that has run
+    local build=build/$1 filters=()
+    shift
+    for room in "$@"; do filters+=(--filter "$room/"); done
+    gcovr --root . "${filters[@]}" --gcov-ignore-parse-errors --exclude-throw-branches "$build" | tail -n +5
+}
+
 while [ $# -gt 0 ]; do
     check=$1
     shift
@@ -25,14 +38,20 @@ while [ $# -gt 0 ]; do
         style) sources | xargs clang-format-19 --dry-run --Werror ;;
         tidy)
             cmake --preset release > /dev/null
-            git ls-files '*.cpp' | xargs -P 2 -n 4 clang-tidy-19 -p build/release --quiet
+            tests/tidy.py
             ;;
+        tidy-changed)
+            cmake --preset release > /dev/null
+            tests/tidy.py --changed-since "${THERMBAL_BASE:-HEAD~1}"
+            ;;
+        clang) build clang thermbald thermbalctl thermbal-sim ;;
         asan)
             # The rooms that bytes from outside reach.
             build asan series_test config_test store_test store_kill_test service_test acquisition_test simulator_test
             for test in series config store store_kill service acquisition simulator; do
                 build/asan/tests/${test}_test --gtest_brief=1
             done
+            covered asan daemon/store daemon/service daemon/acquisition drivers/simulator config core/series
             ;;
         tsan)
             build tsan acquisition_test compute_test
@@ -47,6 +66,26 @@ while [ $# -gt 0 ]; do
             build fuzz fuzzers
             tests/fuzz/run.sh "$seconds"
             ;;
-        *) echo "tests/check.sh: unknown check '$check'; there are style, tidy, asan, tsan, fuzz" >&2; exit 2 ;;
+        coverage)
+            cmake --preset coverage > /dev/null
+            cmake --build --preset coverage
+            ctest --test-dir build/coverage --parallel 2 --timeout 900 --output-on-failure
+            covered coverage core config drivers daemon
+            ;;
+        packages)
+            tests/release/packages.sh build lintian
+            if [ "$(id -u)" = 0 ]; then tests/release/packages.sh installed; fi
+            ;;
+        nightly)
+            "$0" style tidy coverage
+            cmake --preset clang > /dev/null
+            cmake --build --preset clang
+            ctest --preset clang --parallel 2 --timeout 900 --repeat until-pass:3
+            "$0" asan tsan fuzz 600 packages
+            tests/release/reproducible.sh
+            THERMBAL_BIN_DIR=build/release/bin THERMBAL_SOURCE_DIR=. tests/release/hostile.py
+            THERMBAL_BIN_DIR=build/release/bin THERMBAL_SOURCE_DIR=. tests/faults/month.py --days 3
+            ;;
+        *) echo "tests/check.sh: unknown check '$check'; there are style, tidy, tidy-changed, clang, asan, tsan, fuzz, coverage, packages, nightly" >&2; exit 2 ;;
     esac
 done

@@ -13,6 +13,8 @@
 #include <fmt/format.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
 
 #include "descriptor.hpp"
 #include "json_rpc.hpp"
@@ -28,6 +30,8 @@ namespace {
 // With more than this unread, a client's further requests wait until it has read.
 constexpr std::size_t enough_unread = 256UL * 1024;
 constexpr std::size_t most_topics = 32;
+/// The step in which what clients may ask is refilled.
+constexpr long refill_ns = 50'000'000;
 
 struct Client {
     Descriptor socket;
@@ -37,6 +41,7 @@ struct Client {
     std::string received;
     std::string unsent;
     std::size_t sent = 0;              ///< of `unsent`
+    std::size_t requests_left = 0;     ///< until the next refill
     std::size_t published_unread = 0;  ///< notifications queued since `unsent` was last empty
     bool subscribed = false;
     std::set<std::string, std::less<>> topics;  ///< empty: all
@@ -47,7 +52,9 @@ struct Client {
     std::uint32_t watched = 0;
 
     std::size_t unread() const { return unsent.size() - sent; }
-    bool takes_requests() const { return !dead && !last_words && unread() < enough_unread; }
+    bool takes_requests() const {
+        return !dead && !last_words && requests_left > 0 && unread() < enough_unread;
+    }
     bool follows(std::string_view topic) const {
         return subscribed && !dead && !last_words && (topics.empty() || topics.contains(topic));
     }
@@ -98,15 +105,19 @@ struct SocketServer::Parts {
     SocketServerOptions options;
     Listener listener;
     Descriptor epoll;
+    Descriptor refill_timer;
     Descriptor spare;  ///< given up to accept and refuse when the process has no descriptor left
     std::map<std::string, Method, std::less<>> methods;
     std::map<int, Client> clients;
     Counters counters;
     bool dispatching = false;
+    bool refilling = false;         ///< the timer runs: somebody has asked since the last refill
     bool connections_wait = false;  ///< no descriptor left, not even to refuse: tried again at each dispatch
 
     void accept_clients();
     bool refuse_without_descriptor();
+    void run_refill_timer(bool run);
+    void refill();
     bool has_room_for(const Peer& peer) const;
     void refuse_client(const Descriptor& socket);
     void serve(Client& client, std::uint32_t events);
@@ -146,6 +157,7 @@ void SocketServer::Parts::accept_clients() {
         client.peer = peer;
         client.groups = peer_groups(fd);
         client.socket = std::move(socket);
+        client.requests_left = options.max_requests_per_50_ms;
         epoll_event event{};
         event.data.fd = fd;
         epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event);
@@ -179,6 +191,28 @@ void SocketServer::Parts::refuse_client(const Descriptor& socket) {
     const auto line =
         json_rpc::error_reply({json_rpc::try_again, "too many clients; close one, or try again", nullptr});
     (void)::send(socket.get(), line.data(), line.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
+void SocketServer::Parts::run_refill_timer(bool run) {
+    if (refilling == run) return;
+    const timespec step{0, run ? refill_ns : 0};
+    const itimerspec when{step, step};
+    timerfd_settime(refill_timer.get(), 0, &when, nullptr);
+    refilling = run;
+}
+
+/// Everybody may ask again; who had to wait is served. A step in which nobody asked ends the steps.
+void SocketServer::Parts::refill() {
+    std::uint64_t expirations = 0;
+    if (read(refill_timer.get(), &expirations, sizeof expirations) < 0) return;
+    bool asked = false;
+    for (auto& [fd, client] : clients) {
+        if (client.requests_left == options.max_requests_per_50_ms) continue;
+        asked = true;
+        client.requests_left = options.max_requests_per_50_ms;
+        if (!client.dead) serve(client, 0);
+    }
+    run_refill_timer(asked);
 }
 
 void SocketServer::Parts::serve(Client& client, std::uint32_t events) {
@@ -242,6 +276,8 @@ void SocketServer::Parts::refuse_line(Client& client) {
 }
 
 void SocketServer::Parts::answer(Client& client, std::string_view line) {
+    --client.requests_left;
+    run_refill_timer(true);
     if (line.find_first_not_of(" \t\r") == std::string_view::npos) return;
     ++counters.requests;
     auto call = json_rpc::parse(line);
@@ -370,9 +406,24 @@ Result<SocketServer> SocketServer::open(const SocketServerOptions& options) {
     if (!epoll.valid() || epoll_ctl(epoll.get(), EPOLL_CTL_ADD, listener->fd(), &event) != 0)
         return fail(NextStep::stop, fmt::format("socket {}: {}", options.path.string(),
                                                 std::generic_category().message(errno)));
+    Descriptor timer(timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
+    event.events = EPOLLIN;
+    event.data.fd = timer.get();
+    if (!timer.valid() || epoll_ctl(epoll.get(), EPOLL_CTL_ADD, timer.get(), &event) != 0)
+        return fail(NextStep::stop, fmt::format("socket {}: {}", options.path.string(),
+                                                std::generic_category().message(errno)));
     Descriptor spare(::open("/dev/null", O_RDONLY | O_CLOEXEC));
-    SocketServer server(std::unique_ptr<Parts>(new Parts{
-        options, std::move(*listener), std::move(epoll), std::move(spare), {}, {}, {}, false, false}));
+    SocketServer server(std::unique_ptr<Parts>(new Parts{options,
+                                                         std::move(*listener),
+                                                         std::move(epoll),
+                                                         std::move(timer),
+                                                         std::move(spare),
+                                                         {},
+                                                         {},
+                                                         {},
+                                                         false,
+                                                         false,
+                                                         false}));
     // Named here so that they are known methods; they act on the client itself, in result_of.
     server.add_method("subscribe", Access::reads, {});
     server.add_method("unsubscribe", Access::reads, {});
@@ -396,6 +447,8 @@ void SocketServer::dispatch() {
         const auto& event = events[static_cast<std::size_t>(i)];
         if (event.data.fd == parts.listener.fd()) {
             parts.accept_clients();
+        } else if (event.data.fd == parts.refill_timer.get()) {
+            parts.refill();
         } else if (const auto client = parts.clients.find(event.data.fd);
                    client != parts.clients.end() && !client->second.dead) {
             parts.serve(client->second, event.events);

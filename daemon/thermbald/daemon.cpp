@@ -37,6 +37,7 @@ void Daemon::take_scan(Scan& scan) {
         }
     }
     storage_.flush();
+    progress_.store_answered(real_monotonic_ns());
     if (storage_.damaged()) leave_damaged_database();
     tell_storage_news();
     if (server_.counters().subscribers > 0) server_.publish("scan", channels_json().value_or(nullptr));

@@ -20,6 +20,7 @@
 #include "declaration/declarations.hpp"
 #include "declaration/stop_rule.hpp"
 #include "modbus_line.hpp"
+#include "progress.hpp"
 #include "series/test_state.hpp"
 #include "service/hooks.hpp"
 #include "service/socket_server.hpp"
@@ -165,7 +166,7 @@ class Daemon {
     RecentFigures lateness_ms_, commit_ms_, identification_s_;
     std::uint64_t scans_ok_ = 0, scans_late_ = 0, scans_missed_ = 0;
     std::int64_t started_ns_ = 0;
-    std::int64_t last_progress_ns_ = 0;
+    Progress progress_;
 
     sd_event* loop_ = nullptr;
     sd_event_source* close_timer_ = nullptr;

@@ -21,6 +21,17 @@ namespace {
 /// that.
 constexpr std::int64_t close_grace_ns = 20'000'000;
 
+/// Three periods without anything from a line are no progress; a busy host is given some seconds.
+std::int64_t longest_standstill_ns(const Config& config) {
+    return static_cast<std::int64_t>((3.0 * config.test.period_s + 5.0) * 1e9);
+}
+
+std::vector<std::string> line_names(const Config& config) {
+    std::vector<std::string> names;
+    for (const LineConfig& line : config.lines) names.push_back(line.link.name);
+    return names;
+}
+
 Result<void> check(int code, std::string_view what) {
     if (code >= 0) return {};
     return fail(NextStep::stop, fmt::format("{}: {}", what, strerrordesc_np(-code)));
@@ -56,7 +67,7 @@ Daemon::Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer se
       hooks_(std::move(hooks)),
       freeze_watch_(watched_modules(options_.config)),
       started_ns_(clock.monotonic_ns()),
-      last_progress_ns_(real_monotonic_ns()) {
+      progress_(line_names(options_.config), longest_standstill_ns(options_.config), real_monotonic_ns()) {
     newest_good_C_.assign(options_.config.channels.size(), no_value);
     for (std::size_t i = 0; i < options_.config.lines.size(); ++i) {
         lines_.push_back(std::make_unique<ModbusLine>(
@@ -209,6 +220,7 @@ void Daemon::on_line_readings() {
             lateness_ms_.add(
                 static_cast<double>(reading.started_ns - assembler_->grid().due_ns(reading.scan)) * 1e-6);
         }
+        progress_.line_delivered(reading.line, real_monotonic_ns());
         assembler_->add(std::move(reading));
     }
     close_overdue_scans();
@@ -225,7 +237,6 @@ void Daemon::close_overdue_scans() {
         if (generation != generation_)
             break;  // a test began or ended on this scan: the others belong to the old grid
     }
-    last_progress_ns_ = real_monotonic_ns();
     if (options_.exit_when_ended && test_.id > 0 && !is_measuring(test_.state) && hooks_.running() == 0) {
         sd_event_exit(loop_, 0);
     }
@@ -246,12 +257,15 @@ void Daemon::arm_close_timer() {
     sd_event_source_set_enabled(close_timer_, SD_EVENT_ONESHOT);
 }
 
-/// systemd hears from us only while the grid advances: three periods without a closed scan are no progress.
+/// systemd hears from us only while every line and the store make progress.
 void Daemon::feed_watchdog() {
     const auto interval = watchdog_interval();
     if (!interval) return;
-    const double silent_s = static_cast<double>(real_monotonic_ns() - last_progress_ns_) * 1e-9;
-    if (silent_s < 3.0 * options_.config.test.period_s) notify_watchdog();
+    if (const auto standstill = progress_.standstill(real_monotonic_ns())) {
+        spdlog::critical("the watchdog is not fed: {}", *standstill);
+    } else {
+        notify_watchdog();
+    }
     std::uint64_t now_us = 0;
     sd_event_now(loop_, CLOCK_MONOTONIC, &now_us);
     const std::uint64_t due_us = now_us + static_cast<std::uint64_t>(interval->count());

@@ -20,6 +20,8 @@ class HostileTest : public ::testing::Test {
     SocketServerOptions options() const {
         SocketServerOptions made;
         made.path = path;
+        made.max_requests_per_50_ms =
+            1'000'000;  // where nothing else is said: these tests have no time to wait
         return made;
     }
     bool answers() const {
@@ -77,6 +79,33 @@ TEST_F(HostileTest, TenThousandBrokenLinesAreAnsweredWithErrors) {
         }
     }
     EXPECT_TRUE(answers());
+}
+
+TEST_F(HostileTest, RequestsAboveTheRateWaitAndNobodyElseDoes) {
+    auto slow = options();
+    slow.max_requests_per_50_ms = 20;
+    const RunningServer server(slow);
+    LineClient greedy(path);
+    LineClient modest(path);
+    std::string lines;
+    for (int i = 0; i < 200; ++i)
+        lines += R"({"jsonrpc":"2.0","id":)" + std::to_string(i) + R"(,"method":"echo"})" + "\n";
+    const auto before = std::chrono::steady_clock::now();
+    ASSERT_TRUE(greedy.send(lines));
+    EXPECT_EQ(modest.ask(R"({"jsonrpc":"2.0","id":1,"method":"echo"})")["id"], 1);
+    EXPECT_LT(std::chrono::steady_clock::now() - before, 400ms)
+        << "the modest client waits with the greedy one";
+    for (int i = 0; i < 200; ++i) {
+        const auto line = greedy.line();
+        ASSERT_TRUE(line.has_value()) << i;
+        EXPECT_EQ(json::parse(*line)["id"], i);
+    }
+    // 20 at once, then 20 a step of 50 ms; the first step may be nearly over when it begins.
+    EXPECT_GE(std::chrono::steady_clock::now() - before, 400ms);
+    std::this_thread::sleep_for(200ms);
+    const auto dispatches = server.dispatches.load();
+    std::this_thread::sleep_for(200ms);
+    EXPECT_EQ(server.dispatches - dispatches, 0U) << "the loop wakes up though nobody asks";
 }
 
 TEST_F(HostileTest, DeepNestingIsRefusedBeforeAnythingRecurses) {

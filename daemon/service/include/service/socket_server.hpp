@@ -42,6 +42,9 @@ struct SocketServerOptions {
     std::size_t max_clients = 64;
     std::size_t max_clients_per_user = 24;  ///< root and the daemon's own user are exempt
     std::size_t max_request_bytes = 65536;  ///< one line; a longer one is answered with an error and closed
+    /// Of one client; further ones wait in its socket. Refilled in steps of 50 ms, so that so many may come
+    /// at once.
+    std::size_t max_requests_per_50_ms = 50;
     std::size_t max_reply_bytes = 8UL * 1024 * 1024;
     std::size_t max_pending_bytes = 64UL * 1024 * 1024;  ///< unread replies of all clients together
     std::size_t max_backlog_bytes = 1024UL * 1024;  ///< unread notifications at which a subscriber is dropped
