@@ -183,7 +183,8 @@ def measures_serial_without_network(box):
     box.run("install -D -m 644 /usr/share/thermbal/systemd/serial-only.conf "
             "/etc/systemd/system/thermbald.service.d/serial-only.conf")
     write_config(box, CONFIG, {'transport = "tcp"\nhost': 'transport = "rtu"\ndevice = "/run/module"\n# host',
-                               "\nport = 1502": "\n# port = 1502"})
+                               "\nport = 1502": "\n# port = 1502",
+                               "# response_timeout_ms = 500  # the slowest": "response_timeout_ms = 200  # the slowest"})
     box.run("systemctl daemon-reload && systemctl restart thermbald")
     before = good_samples(box)
     box.wait_for(lambda: good_samples(box) > before + 16, "samples over the serial line", 60)
