@@ -4,8 +4,7 @@
 #   tidy         clang-tidy on every source (about 15 min on 2 cores; what passed once is remembered)
 #   tidy-changed clang-tidy on what differs from the commit before, or from $THERMBAL_BASE
 #   clang        the programs by clang
-#   asan         the C++ tests of what bytes from outside reach, under AddressSanitizer and UndefinedBehaviorSanitizer, with the
-#                lines that they cover
+#   asan         the C++ tests of what bytes from outside reach, under AddressSanitizer and UndefinedBehaviorSanitizer
 #   tsan         what has threads under ThreadSanitizer
 #   fuzz [SECONDS]  what reads bytes from outside under libFuzzer and the sanitizers, so many seconds a target (10), two at a time
 #   coverage     the lines that all C++ tests cover
@@ -51,7 +50,6 @@ while [ $# -gt 0 ]; do
             for test in series config store store_kill service acquisition simulator; do
                 build/asan/tests/${test}_test --gtest_brief=1
             done
-            covered asan daemon/store daemon/service daemon/acquisition drivers/simulator config core/series
             ;;
         tsan)
             build tsan acquisition_test compute_test
