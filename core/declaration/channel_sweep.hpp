@@ -9,13 +9,6 @@
 
 namespace thermbal {
 
-/// What the paper's method says of one channel on one window.
-struct ChannelSweep {
-    std::vector<double> rmse_by_n_C;
-    RmseMinimum minimum;
-    SvrPrediction svr;
-};
-
 /// Outliers, gaps, wavelet filter, SVR sweep over n, minimum of RMSE over n, prediction at that n. `start_s`
 /// is the time of the first sample since the start of the test. Errors: refuse_input where the channel's
 /// samples do not allow it (gaps, flat), stop when cancelled.

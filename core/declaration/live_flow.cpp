@@ -12,6 +12,23 @@
 
 namespace thermbal {
 
+namespace {
+
+std::pair<std::int64_t, std::size_t> window_key(const TestWindow& window) {
+    return {std::llround(window.start_s * 1e3), window.scans};
+}
+
+/// The longest window, of those that each are `sweep_growth` longer than the one before, that is in this one.
+double last_sweep_length_s(const TestWindow& window, const FlowOptions& options) {
+    const double shortest_s = options.guards.shortest_window_min * 60.0;
+    const double length_s = window.end_s() - window.start_s;
+    if (length_s <= shortest_s || options.sweep_growth <= 0.0) return length_s;
+    const double steps = std::floor(std::log(length_s / shortest_s) / std::log1p(options.sweep_growth));
+    return shortest_s * std::pow(1.0 + options.sweep_growth, steps);
+}
+
+}  // namespace
+
 Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::set<std::string>& settled,
                                          const ParallelFor& parallel_for,
                                          const std::function<bool()>& cancelled) {
@@ -49,10 +66,9 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
             ask_shared_modes(channel, evidence, options_);
         }
         if (!settled.contains(channel.channel) && sweep_is_wanted(channel)) {
-            const auto swept = sweep_channel(samples.values, since.start_s, since.period_s, options_,
-                                             parallel_for, cancelled);
+            const auto sweep = swept(since, channel.channel, parallel_for, cancelled);
             if (cancelled()) return fail(NextStep::stop, "cancelled");
-            ask_sweep(channel, swept, options_);
+            ask_sweep(channel, sweep, options_);
         }
         conclude(channel, verdict.window_end_min, options_);
         verdict.channels.push_back(std::move(channel));
@@ -81,6 +97,21 @@ bool LiveFlow::sweep_is_wanted(const ChannelVerdict& channel) const {
     return false;
 }
 
+Result<ChannelSweep> LiveFlow::swept(const TestWindow& since, const std::string& channel,
+                                     const ParallelFor& parallel_for,
+                                     const std::function<bool()>& cancelled) {
+    const TestWindow seen = options_.sweep_when == SweepWhen::needed
+                                ? window_until(since, since.start_s + last_sweep_length_s(since, options_))
+                                : since;
+    const std::pair key = window_key(seen);
+    const auto known = sweeps_.find(channel);
+    if (known != sweeps_.end() && known->second.window == key) return known->second.result;
+    Result<ChannelSweep> result = sweep_channel(seen.channel(channel)->values, seen.start_s, seen.period_s,
+                                                options_, parallel_for, cancelled);
+    if (!cancelled()) sweeps_.insert_or_assign(channel, Sweep{key, result});
+    return result;
+}
+
 const Result<ArchivedEstimate>& LiveFlow::estimate(const TestWindow& regime,
                                                    const std::vector<double>& start_level_C) {
     const auto compute = [&]() -> Result<ArchivedEstimate> {
@@ -93,7 +124,7 @@ const Result<ArchivedEstimate>& LiveFlow::estimate(const TestWindow& regime,
         if (!plain) return std::unexpected(plain.error());
         return ArchivedEstimate{std::move(*plain), {}};
     };
-    const std::pair key{std::llround(regime.start_s * 1e3), regime.scans};
+    const std::pair key = window_key(regime);
     const auto known = estimates_.find(key);
     if (known != estimates_.end()) return known->second;
     return estimates_.emplace(key, compute()).first->second;

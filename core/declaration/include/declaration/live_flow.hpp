@@ -67,6 +67,10 @@ struct FlowOptions {
     GuardOptions guards;
     std::uint64_t seed = 1;  ///< of everything that is sampled; the same seed gives the same bits
     SweepWhen sweep_when = SweepWhen::needed;
+    /// With `needed`: the sweep sees the window as it was when it was last so much longer than the time
+    /// before, counted from its shortest. On a noisy channel a sweep takes seconds, and 4 min more of 100
+    /// change no curve.
+    double sweep_growth = 0.04;
 };
 
 /// All structural channels at the end of one window, in the window's order.
@@ -100,12 +104,19 @@ class LiveFlow {
   private:
     void forget_before(double window_end_s, double period_s);
     bool sweep_is_wanted(const ChannelVerdict& channel) const;
+    Result<ChannelSweep> swept(const TestWindow& since, const std::string& channel,
+                               const ParallelFor& parallel_for, const std::function<bool()>& cancelled);
     const Result<ArchivedEstimate>& estimate(const TestWindow& regime,
                                              const std::vector<double>& start_level_C);
 
     FlowOptions options_;
     std::map<std::pair<std::int64_t, std::size_t>, Result<ArchivedEstimate>>
         estimates_;  // by start and scans
+    struct Sweep {
+        std::pair<std::int64_t, std::size_t> window;  // start and scans
+        Result<ChannelSweep> result;
+    };
+    std::map<std::string, Sweep> sweeps_;  // the newest of each channel
 };
 
 }  // namespace thermbal

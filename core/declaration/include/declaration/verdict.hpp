@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "declaration/criterion.hpp"
 #include "declaration/guard.hpp"
 
 namespace thermbal {
@@ -35,6 +36,13 @@ struct KalmanPrediction {
     double steady_state_low_C = std::numeric_limits<double>::quiet_NaN();
     double steady_state_high_C = std::numeric_limits<double>::quiet_NaN();
     double equilibrium_time_min = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// What the paper's method says of one channel on one window.
+struct ChannelSweep {
+    std::vector<double> rmse_by_n_C;
+    RmseMinimum minimum;
+    SvrPrediction svr;
 };
 
 /// One channel at the end of one window. NaN where a figure is not known.
