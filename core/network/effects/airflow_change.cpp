@@ -1,5 +1,4 @@
-#include <limits>
-
+#include "effect_parameters.hpp"
 #include "network/effect.hpp"
 #include "network_builder.hpp"
 
@@ -25,12 +24,7 @@ EffectDefinition airflow_change_effect() {
                                        .prior_centre = 1,
                                        .prior_sigma = 0.6,
                                        .logarithmic = true},
-                                      {.name = "onset_s",
-                                       .lower = 0,
-                                       .upper = 1e6,
-                                       .prior_centre = 3600,
-                                       .prior_sigma = std::numeric_limits<double>::infinity(),
-                                       .is_time = true}}}},
+                                      onset_parameter()}}},
             .source =
                 "a door, a fan, a coolant jet: still air 5 to 10, moved air 10 to 50 W/m2K (VDI-Waermeatlas; "
                 "EMod "

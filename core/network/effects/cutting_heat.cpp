@@ -1,5 +1,4 @@
-#include <limits>
-
+#include "effect_parameters.hpp"
 #include "network/effect.hpp"
 #include "network_builder.hpp"
 
@@ -24,19 +23,7 @@ EffectDefinition cutting_heat_effect() {
             .forms = {{.name = "step",
                        .site = EffectSite::node,
                        .equation = "+ power_W from onset_s on",
-                       .parameters = {{.name = "power_W",
-                                       .lower = 1e-3,
-                                       .upper = 10,
-                                       .prior_centre = 0.3,
-                                       .prior_sigma = 1,
-                                       .logarithmic = true,
-                                       .prior_unit = PriorUnit::mean_source_power},
-                                      {.name = "onset_s",
-                                       .lower = 0,
-                                       .upper = 1e6,
-                                       .prior_centre = 3600,
-                                       .prior_sigma = std::numeric_limits<double>::infinity(),
-                                       .is_time = true}}}},
+                       .parameters = {heat_power_parameter(), onset_parameter()}}},
             .source = "the share of the cutting power that goes into tool and spindle: a step of heat",
             .look_alikes = {"airflow_change", "motor_heat", "sensor_detached"},
             .told_apart_by =

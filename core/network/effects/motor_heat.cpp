@@ -1,3 +1,4 @@
+#include "effect_parameters.hpp"
 #include "network/effect.hpp"
 #include "network_builder.hpp"
 
@@ -19,13 +20,7 @@ EffectDefinition motor_heat_effect() {
         .forms = {{.name = "constant",
                    .site = EffectSite::node,
                    .equation = "+ power_W",
-                   .parameters = {{.name = "power_W",
-                                   .lower = 1e-3,
-                                   .upper = 10,
-                                   .prior_centre = 0.3,
-                                   .prior_sigma = 1,
-                                   .logarithmic = true,
-                                   .prior_unit = PriorUnit::mean_source_power}}}},
+                   .parameters = {heat_power_parameter()}}},
         .source =
             "copper and iron losses of a drive at constant speed and load are constant but for 0.4 % per K",
         .look_alikes = {"preload_growth", "cutting_heat", "sensor_offset"},

@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "effect_parameters.hpp"
 #include "network/effect.hpp"
 #include "network_builder.hpp"
 
@@ -29,13 +30,7 @@ EffectDefinition run_in_heat_effect() {
                   .site = EffectSite::source,
                   .equation =
                       "+ power_W * drive * exp(-t / time_constant_s), drive as the source's column scales it",
-                  .parameters = {{.name = "power_W",
-                                  .lower = 1e-3,
-                                  .upper = 10,
-                                  .prior_centre = 0.3,
-                                  .prior_sigma = 1,
-                                  .logarithmic = true,
-                                  .prior_unit = PriorUnit::mean_source_power},
+                  .parameters = {heat_power_parameter(),
                                  {.name = "time_constant_s",
                                   .lower = 120,
                                   .upper = 36000,

@@ -1,5 +1,4 @@
-#include <limits>
-
+#include "effect_parameters.hpp"
 #include "network/effect.hpp"
 #include "network_builder.hpp"
 
@@ -26,12 +25,7 @@ EffectDefinition sensor_detached_effect() {
                                    .upper = 1,
                                    .prior_centre = 0.5,
                                    .prior_sigma = 0.25},
-                                  {.name = "onset_s",
-                                   .lower = 0,
-                                   .upper = 1e6,
-                                   .prior_centre = 3600,
-                                   .prior_sigma = std::numeric_limits<double>::infinity(),
-                                   .is_time = true}}}},
+                                  onset_parameter()}}},
         .source =
             "stem conduction and a lost contact: a weighted mean of surface and air (Fluke, immersion rules)",
         .look_alikes = {"airflow_change", "sensor_drift", "cutting_heat"},

@@ -1,5 +1,4 @@
-#include <limits>
-
+#include "effect_parameters.hpp"
 #include "network/effect.hpp"
 #include "network_builder.hpp"
 
@@ -26,12 +25,7 @@ EffectDefinition spindle_stop_effect() {
                                    .prior_centre = 900,
                                    .prior_sigma = 1,
                                    .logarithmic = true},
-                                  {.name = "from_s",
-                                   .lower = 0,
-                                   .upper = 1e6,
-                                   .prior_centre = 3600,
-                                   .prior_sigma = std::numeric_limits<double>::infinity(),
-                                   .is_time = true}}}},
+                                  onset_parameter("from_s")}}},
         .source = "no rotation, no friction",
         .look_alikes = {"coolant_cycling"},
         .told_apart_by =

@@ -31,18 +31,34 @@ HEATS = [("front_bearing", 95.0, True), ("rear_bearing", 60.0, True), ("motor", 
 
 
 @dataclass
+class Room:
+    """A level, a slow swing over the day, the cycle of an air conditioning."""
+
+    level_C: float
+    swing_C: float = 0.0
+    cycle_C: float = 0.0
+    period_s: float = 1200.0
+    phase: float = 0.0
+
+    def __call__(self, t):
+        return (self.level_C + self.swing_C * (np.sin(2 * np.pi * (t / 43200.0 + self.phase)) - np.sin(2 * np.pi * self.phase))
+                + self.cycle_C * np.sin(2 * np.pi * t / self.period_s))
+
+
+@dataclass
 class Setup:
     """A machine, how it is measured and run, before anything is hidden in it."""
 
     machine: Machine
     channels: dict  # channel -> (part, cell)
-    room_C: float
-    room_column: bool
+    run_room: object  # room temperature over time in C
+    holdout_room: object
+    room: str  # "constant"; "measured" and in the model; "unused": measured, the model does not know
     noise_C: float
     rounding_C: float
     run_speed: Speed
     holdout_speed: Speed
-    start_C: np.ndarray
+    start_over_room_C: np.ndarray  # a part
 
 
 def draw_machine(rng):
@@ -87,13 +103,24 @@ def draw_setup(rng):
     channels = {f"T{k + 2}": (int(part), int(rng.integers(0, CELLS))) for k, part in enumerate(places)}
     rounding = float(rng.choice([0.01, 0.1], p=[0.75, 0.25]))
     run, holdout = draw_speeds(rng)
-    room = float(rng.uniform(17, 24))
-    start = np.repeat(room + rng.normal(0, 0.1, n), CELLS)
-    return Setup(machine, channels, room, bool(rng.random() < 0.5), float(rng.uniform(0.03, 0.09)), rounding, run, holdout, start)
+    level = float(rng.uniform(17, 24))
+    room = "measured" if rng.random() < 0.5 else "constant"
+    rooms = [Room(level), Room(level)]
+    if room == "measured":
+        rooms = [draw_room(rng, level), draw_room(rng, level + float(rng.normal(0, 2.0)))]
+    return Setup(machine, channels, *rooms, room, float(rng.uniform(0.03, 0.09)), rounding, run, holdout, rng.normal(0, 0.1, n))
 
 
-def draw_effect(kind, rng, setup, avoid=()):
-    """Makes an effect of a kind at a random place; returns (function of size, truth of place)."""
+def draw_room(rng, level_C):
+    return Room(level_C, float(rng.uniform(0, 1.5)), float(rng.choice([0.0, rng.uniform(0.1, 0.4)])),
+                float(rng.uniform(600, 1800)), float(rng.random()))
+
+
+def draw_effect(kind, rng, setup, plain, avoid=()):
+    """Makes an effect of a kind at a random place; returns (function of size, truth of place).
+
+    plain: the volumes of the run without any effect, a row a scan.
+    """
     machine = setup.machine
     n = len(machine.parts)
     sensed = sorted({part for part, _ in setup.channels.values()})
@@ -117,10 +144,14 @@ def draw_effect(kind, rng, setup, avoid=()):
         shape = str(rng.choice(["ramp", "day", "settling"]))
         return lambda s: E.AmbientDrift(machine, None, sign * s, shape, END_S), {"at": "ambient", "node": "ambient"}
     if kind == "coolant_cycling":
+        if rng.random() < 0.5:
+            warmest = float(plain[:, machine.cell(part, (cell0 + 1) % CELLS)].max())
+            strength = float(rng.uniform(1.5, 3.0))
+            return lambda s: E.CoolantThermostat(machine, part, s, cell0, warmest, strength), at_part
         period, duty, phase = rng.uniform(480, 1800), rng.uniform(0.3, 0.6), rng.random()
         return lambda s: E.CoolantCycling(machine, part, s, cell0, period, duty, phase, 25.0), at_part | {"period_s": period}
     if kind == "friction_viscosity":
-        return lambda s: E.FrictionViscosity(machine, bearing, s, 68.0, 8.7, setup.room_C), at_source
+        return lambda s: E.FrictionViscosity(machine, bearing, s, 68.0, 8.7, setup.run_room.level_C), at_source
     if kind == "preload_growth":
         housing = min(machine.neighbours(own), key=lambda p: name(p) != "sleeve")
         return lambda s: E.PreloadGrowth(machine, bearing, s, housing), at_source
@@ -140,7 +171,7 @@ def draw_effect(kind, rng, setup, avoid=()):
         return (lambda s: E.AirflowChange(machine, part, s, onset, sign),
                 {"at": name(part), "node": name(part), "onset_s": onset})
     if kind == "surface_nonlinearity":
-        return lambda s: E.SurfaceNonlinearity(machine, None, s, setup.room_C), {"at": "ambient", "node": "ambient"}
+        return lambda s: E.SurfaceNonlinearity(machine, None, s, setup.run_room.level_C), {"at": "ambient", "node": "ambient"}
     if kind == "slow_structure":
         part = int(rng.choice([p for p in near if p < 9]))
         conductance, cell = rng.uniform(3, 9), int(rng.integers(0, CELLS))
@@ -184,11 +215,18 @@ CATALOGUE = ["ambient_drift", "coolant_cycling", "friction_viscosity", "preload_
 OUTSIDE = ["heat_pulse", "heat_wave", "contact_change", "sensor_crosstalk"]
 
 
-def nominal_model(rng, setup, room_column, known_sigma, stated_sigma=0.3):
+def neutral_names(rng, setup):
+    """What the files call the parts: no name says what a part is."""
+    order = rng.permutation(len(setup.machine.parts))
+    return {part.name: f"n{order[k] + 1:02d}" for k, part in enumerate(setup.machine.parts)}
+
+
+def nominal_model(rng, setup, room, known_sigma, stated_sigma=0.3):
     """The lumped TOML: true capacities, joints with the way through both parts, surfaces, powers; each off by known_sigma."""
     machine = setup.machine
     off = lambda value: value * np.exp(rng.normal(0, known_sigma))  # noqa: E731
-    lines = ["[model]", 'name = "spindle head"', 'ambient_C = "T1"' if room_column else f"ambient_C = {setup.room_C:.2f}",
+    ambient = '"T1"' if room == "measured" else f"{setup.run_room.level_C:.2f}"
+    lines = ["[model]", 'name = "machine"', f"ambient_C = {ambient}",
              f"relative_sigma = {stated_sigma}", ""]
     for part in machine.parts:
         lines += ["[[node]]", f'name = "{part.name}"', f"heat_capacity_J_per_K = {off(part.capacity_J_per_K):.1f}", ""]

@@ -35,6 +35,9 @@ class Effect:
     def breaks(self, end_s):
         return []
 
+    def begin(self):
+        """Called before every run."""
+
     def main_parameter(self):
         return {}
 
@@ -45,6 +48,29 @@ class OnPart(Effect):
     def __init__(self, machine, place, size, cell0):
         super().__init__(machine, place, size)
         self.cells = [machine.cell(place, (cell0 + k) % 6) for k in range(3)]
+
+
+class OnSource(Effect):
+    """Changes the power of one source."""
+
+    def power(self, power_W, source, t, T, air_C):
+        return self.changed(power_W, t, T) if source == self.place else power_W
+
+    def own_C(self, T):
+        heat = self.machine.heats[self.place]
+        return np.mean([T[self.machine.cell(heat.part, c)] for c in heat.cells])
+
+
+class SetsIn(Effect):
+    """Rises from nothing to all of it within `rise_s` from onset_s on."""
+
+    rise_s = 120.0
+
+    def risen(self, t):
+        return np.clip((t - self.onset_s) / self.rise_s, 0, 1)
+
+    def breaks(self, end_s):
+        return [self.onset_s, self.onset_s + self.rise_s]
 
 
 class AmbientDrift(Effect):
@@ -67,7 +93,7 @@ class AmbientDrift(Effect):
 
 
 class CoolantCycling(OnPart):
-    """A chiller: a square wave of a period and a duty, softened by the coolant's own delay."""
+    """A chiller on a timer: a square wave of a period and a duty, softened by the coolant's own delay."""
 
     kind, size_guess = "coolant_cycling", 60.0
 
@@ -89,7 +115,43 @@ class CoolantCycling(OnPart):
         return {"power_W": self.size}
 
 
-class FrictionViscosity(Effect):
+class CoolantThermostat(OnPart):
+    """A chiller with a two-point controller that feels one volume of the part it cools.
+
+    `size` is by how much it keeps the part below where it would have gone; half of that is the hysteresis.
+    """
+
+    kind, size_guess = "coolant_cycling", 0.6
+
+    def __init__(self, machine, place, size, cell0, warmest_C, strength):
+        super().__init__(machine, place, size, cell0)
+        self.on_C, self.off_C = warmest_C - 0.5 * size, warmest_C - size
+        lossy = np.diag(machine.surface) - machine.conduction
+        unit = np.zeros(len(lossy))
+        unit[self.cells] = 1 / 3
+        self.feels = self.cells[1]
+        self.power_W = strength * size / np.linalg.solve(lossy, unit)[self.feels]
+        self.is_on = False
+
+    def begin(self):
+        self.is_on = False
+
+    def switching(self, T):
+        """Falls through zero when the controller switches."""
+        return T[self.feels] - self.off_C if self.is_on else self.on_C - T[self.feels]
+
+    def switch(self):
+        self.is_on = not self.is_on
+
+    def add_heat(self, heat_W, t, T, rpm, air_C):
+        if self.is_on:
+            heat_W[self.cells] -= self.power_W / 3
+
+    def main_parameter(self):
+        return {"power_W": self.power_W}
+
+
+class FrictionViscosity(OnSource):
     """Viscous share of the friction after Walther's equation for the lubricant, at the power 2/3."""
 
     kind, size_guess, size_limit = "friction_viscosity", 0.5, 1.0
@@ -105,42 +167,32 @@ class FrictionViscosity(Effect):
     def viscosity(self, C):
         return 10 ** 10 ** (self.level - self.slope * np.log10(C + 273.15)) - 0.7
 
-    def power(self, power_W, source, t, T, air_C):
-        if source != self.place:
-            return power_W
-        heat = self.machine.heats[source]
-        own = np.mean([T[self.machine.cell(heat.part, c)] for c in heat.cells])
-        ratio = (self.viscosity(own) / self.viscosity(self.start_C)) ** (2 / 3)
+    def changed(self, power_W, t, T):
+        ratio = (self.viscosity(self.own_C(T)) / self.viscosity(self.start_C)) ** (2 / 3)
         return power_W * (1 - self.size + self.size * ratio)
 
 
-class PreloadGrowth(Effect):
+class PreloadGrowth(OnSource):
     kind, size_guess, size_limit = "preload_growth", 0.03, 0.3
 
     def __init__(self, machine, place, size, housing):
         super().__init__(machine, place, size)
         self.housing = housing
 
-    def power(self, power_W, source, t, T, air_C):
-        if source != self.place:
-            return power_W
-        heat = self.machine.heats[source]
-        own = np.mean([T[self.machine.cell(heat.part, c)] for c in heat.cells])
+    def changed(self, power_W, t, T):
         housing = np.mean(T[self.machine.cell(self.housing, 0):self.machine.cell(self.housing, 6)])
-        return power_W * max(0.2, 1 + self.size * (own - housing))
+        return power_W * max(0.2, 1 + self.size * (self.own_C(T) - housing))
 
 
-class RunInHeat(Effect):
+class RunInHeat(OnSource):
     kind, size_guess = "run_in_heat", 60.0
 
     def __init__(self, machine, place, size, decay_s, stretch):
         super().__init__(machine, place, size)
         self.decay_s, self.stretch = decay_s, stretch
 
-    def power(self, power_W, source, t, T, air_C):
-        if source != self.place or power_W == 0.0:
-            return power_W
-        return power_W + self.size * np.exp(-((t / self.decay_s) ** self.stretch))
+    def changed(self, power_W, t, T):
+        return power_W and power_W + self.size * np.exp(-((t / self.decay_s) ** self.stretch))
 
     def main_parameter(self):
         return {"power_W": self.size}
@@ -156,18 +208,15 @@ class MotorHeat(OnPart):
         return {"power_W": self.size}
 
 
-class CuttingHeat(OnPart):
-    kind, size_guess = "cutting_heat", 60.0
+class CuttingHeat(SetsIn, OnPart):
+    kind, size_guess, rise_s = "cutting_heat", 60.0, 90.0
 
     def __init__(self, machine, place, size, cell0, onset_s):
         super().__init__(machine, place, size, cell0)
         self.onset_s = onset_s
 
     def add_heat(self, heat_W, t, T, rpm, air_C):
-        heat_W[self.cells] += self.size / 3 * np.clip((t - self.onset_s) / 90.0, 0, 1)
-
-    def breaks(self, end_s):
-        return [self.onset_s, self.onset_s + 90.0]
+        heat_W[self.cells] += self.size / 3 * self.risen(t)
 
     def main_parameter(self):
         return {"power_W": self.size}
@@ -193,7 +242,7 @@ class SpindleStop(Effect):
         return {"duration_s": self.size}
 
 
-class AirflowChange(Effect):
+class AirflowChange(SetsIn):
     """The part's surface transfer times exp(size) from a moment on, over two minutes."""
 
     kind, size_guess, size_limit = "airflow_change", 0.4, 1.6
@@ -205,11 +254,8 @@ class AirflowChange(Effect):
 
     def loss(self, loss_W, surface, over_C, t):
         loss_W = loss_W.copy()
-        loss_W[self.cells] *= np.exp(self.direction * self.size * np.clip((t - self.onset_s) / 120.0, 0, 1))
+        loss_W[self.cells] *= np.exp(self.direction * self.size * self.risen(t))
         return loss_W
-
-    def breaks(self, end_s):
-        return [self.onset_s, self.onset_s + 120.0]
 
     def main_parameter(self):
         return {"factor": float(np.exp(self.direction * self.size))}
@@ -278,12 +324,14 @@ class SensorLag(OnChannel):
         return {"time_constant_s": self.size}
 
 
-class SensorOffset(OnChannel):
-    kind, size_guess = "sensor_offset", 0.5
-
+class SignedOnChannel(OnChannel):
     def __init__(self, machine, place, size, sign):
         super().__init__(machine, place, size)
         self.sign = sign
+
+
+class SensorOffset(SignedOnChannel):
+    kind, size_guess = "sensor_offset", 0.5
 
     def distort(self, times_s, node_C, room_C):
         return node_C + self.sign * self.size
@@ -292,12 +340,8 @@ class SensorOffset(OnChannel):
         return {"offset_C": self.sign * self.size}
 
 
-class SensorDrift(OnChannel):
+class SensorDrift(SignedOnChannel):
     kind, size_guess = "sensor_drift", 0.1
-
-    def __init__(self, machine, place, size, sign):
-        super().__init__(machine, place, size)
-        self.sign = sign
 
     def distort(self, times_s, node_C, room_C):
         hours = times_s / 3600
@@ -361,7 +405,7 @@ class HeatWave(OnPart):
         heat_W[self.cells] += self.size / 3 * (1 - np.cos(2 * np.pi * t / self.period_s)) / 2
 
 
-class ContactChange(Effect):
+class ContactChange(SetsIn):
     """Outside the catalogue: a joint between two parts opens at some moment."""
 
     kind, inside_catalogue, size_guess, size_limit = "contact_change", False, 0.5, 0.95
@@ -373,12 +417,9 @@ class ContactChange(Effect):
         self.conductance = j.conductance_W_per_K
 
     def add_heat(self, heat_W, t, T, rpm, air_C):
-        flow = self.size * self.conductance * np.clip((t - self.onset_s) / 120.0, 0, 1) * (T[self.a] - T[self.b])
+        flow = self.size * self.conductance * self.risen(t) * (T[self.a] - T[self.b])
         heat_W[self.a] += flow
         heat_W[self.b] -= flow
-
-    def breaks(self, end_s):
-        return [self.onset_s, self.onset_s + 120.0]
 
 
 class SensorCrosstalk(OnChannel):

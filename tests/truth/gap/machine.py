@@ -105,20 +105,47 @@ def simulate(machine, speed, room, start_C, times_s, effects):
     breaks = sorted({t for t in (*speed.breaks, *(b for e in effects for b in e.breaks(times_s[-1])))
                      if times_s[0] < t < times_s[-1]})
     edges = [times_s[0], *breaks, times_s[-1]]
+    controllers = [e for e in effects if hasattr(e, "switching")]
+    for effect in effects:
+        effect.begin()
     result = np.full((len(times_s), len(capacity)), np.nan)
     state = first
     for begin, end in zip(edges, edges[1:]):
-        inside = np.flatnonzero((times_s >= begin) & (times_s <= end))
-        at = np.unique(np.append(times_s[inside], end))
-        # a hair inside, so that a switching at `begin` has happened and the one at `end` has not
-        solution = solve_ivp(lambda t, T: rate(min(max(t, begin + 1e-6), end - 1e-6), T), (begin, end), state, method="BDF",
-                             t_eval=at, jac=jacobian, rtol=1e-5, atol=2e-4, first_step=min(2.0, (end - begin) / 2),
-                             max_step=600.0)
-        if not solution.success:
-            raise RuntimeError(solution.message)
-        result[inside] = solution.y.T[np.searchsorted(at, times_s[inside])]
-        state = solution.y[:, -1]
+        while begin < end:
+            state, begin = advance(rate, jacobian, controllers, begin, end, state, times_s, result)
     return result
+
+
+def advance(rate, jacobian, controllers, begin, end, state, times_s, result):
+    """Integrates to `end`, or to where a controller switches; fills the rows of `result` on the way."""
+    for controller in controllers:
+        if controller.switching(state) < 0:
+            controller.switch()
+    inside = np.flatnonzero((times_s >= begin) & (times_s <= end))
+    at = np.unique(np.append(times_s[inside], end))
+    events = [terminal(c) for c in controllers]
+    # a hair inside, so that a switching at `begin` has happened and the one at `end` has not
+    solution = solve_ivp(lambda t, T: rate(min(max(t, begin + 1e-6), end - 1e-6), T), (begin, end), state, method="BDF",
+                         t_eval=at, jac=jacobian, rtol=1e-5, atol=2e-4, first_step=min(2.0, (end - begin) / 2),
+                         max_step=60.0 if controllers else 600.0, events=events or None)
+    if not solution.success:
+        raise RuntimeError(solution.message)
+    reached = inside[: np.searchsorted(times_s[inside], solution.t[-1], side="right")] if len(solution.t) else inside[:0]
+    if len(reached):
+        result[reached] = solution.y.T[np.searchsorted(solution.t, times_s[reached])]
+    for k, controller in enumerate(controllers):
+        if len(solution.t_events[k]):
+            controller.switch()
+            return solution.y_events[k][-1], solution.t_events[k][-1]
+    return solution.y[:, -1], end
+
+
+def terminal(controller):
+    def event(t, T):
+        return controller.switching(T)
+
+    event.terminal, event.direction = True, -1
+    return event
 
 
 def source_power(machine, source, rpm):

@@ -29,11 +29,15 @@ class Unreachable(Exception):
     """The strength asked for cannot be had at this place."""
 
 
-def readings(setup, speed, effects):
+def volumes_of(setup, speed, room, effects):
+    start_C = np.repeat(room(0.0) + setup.start_over_room_C, drawing.CELLS)
+    return simulate(setup.machine, speed, room, start_C, TIMES_S, effects)
+
+
+def readings(setup, speed, room, effects):
     """Noise-free readings by channel, and what the room's sensor would read."""
-    room = lambda t: setup.room_C  # noqa: E731
-    volumes = simulate(setup.machine, speed, room, setup.start_C, TIMES_S, effects)
-    room_C = np.array([setup.room_C + sum(e.room_C(t) for e in effects) for t in TIMES_S])
+    volumes = volumes_of(setup, speed, room, effects)
+    room_C = np.array([room(t) + sum(e.room_C(t) for e in effects) for t in TIMES_S])
     result = {}
     for channel, (part, cell) in setup.channels.items():
         value = volumes[:, setup.machine.cell(part, cell)]
@@ -56,7 +60,7 @@ def effect_of_strength(setup, plain, make, wanted_C):
         limit = effect.size_limit
         if size > limit:
             size, effect = limit, make(limit)
-        change = peak_change_C(plain, readings(setup, setup.run_speed, [effect])[0])
+        change = peak_change_C(plain, readings(setup, setup.run_speed, setup.run_room, [effect])[0])
         if abs(change / wanted_C - 1) < 0.03:
             return effect
         if size >= limit and change < wanted_C:
@@ -74,10 +78,10 @@ def measured(rng, setup, clean):
     return np.round(noisy / setup.rounding_C) * setup.rounding_C
 
 
-def csv_text(rng, setup, speed, effects, room_column):
-    clean, room_C = readings(setup, speed, effects)
+def csv_text(rng, setup, speed, room, effects, room_is_measured):
+    clean, room_C = readings(setup, speed, room, effects)
     columns = {"time_s": [f"{t:.0f}" for t in TIMES_S]}
-    if room_column:
+    if room_is_measured:
         columns["T1"] = [f"{v:.2f}" for v in measured(rng, setup, room_C)]
     error = []
     for channel, values in clean.items():
@@ -95,11 +99,16 @@ def make_case(job):
     for attempt in range(40):
         rng = np.random.default_rng([seed, attempt])
         setup = drawing.draw_setup(rng)
+        room = setup.room
+        if "ambient_drift" in kinds:
+            setup.run_room = setup.holdout_room = drawing.Room(setup.run_room.level_C)
+            room = str(rng.choice(["constant", "unused"]))
         try:
-            plain = readings(setup, setup.run_speed, [])[0]
+            plain = readings(setup, setup.run_speed, setup.run_room, [])[0]
+            volumes = volumes_of(setup, setup.run_speed, setup.run_room, [])
             effects, truths, taken = [], [], []
             for kind in kinds:
-                make, place = drawing.draw_effect(kind, rng, setup, taken)
+                make, place = drawing.draw_effect(kind, rng, setup, volumes, taken)
                 effect = effect_of_strength(setup, plain, make, strength * setup.noise_C)
                 taken.append(place["node"])
                 effects.append(effect)
@@ -107,14 +116,25 @@ def make_case(job):
                                "neighbours": neighbours(setup, place["node"]), "parameters": effect.main_parameter()})
         except (Unreachable, ValueError):
             continue
-        room_column = setup.room_column and "ambient_drift" not in kinds
-        run, run_floor = csv_text(rng, setup, setup.run_speed, effects, room_column)
-        holdout, holdout_floor = csv_text(rng, setup, setup.holdout_speed, effects, room_column)
-        model = drawing.nominal_model(rng, setup, room_column, known_sigma)
-        truth = {"effects": truths, "strength": strength, "noise_C": setup.noise_C, "rounding_C": setup.rounding_C,
-                 "run_floor_C": run_floor, "holdout_floor_C": holdout_floor, "seed": seed}
+        run, run_floor = csv_text(rng, setup, setup.run_speed, setup.run_room, effects, room != "constant")
+        holdout, holdout_floor = csv_text(rng, setup, setup.holdout_speed, setup.holdout_room, effects, room != "constant")
+        model = drawing.nominal_model(rng, setup, room, known_sigma)
+        names = drawing.neutral_names(rng, setup)
+        for name, neutral in names.items():
+            model = model.replace(f'"{name}"', f'"{neutral}"')
+        truth = {"effects": [renamed(t, names) for t in truths], "strength": strength, "noise_C": setup.noise_C,
+                 "rounding_C": setup.rounding_C, "run_floor_C": run_floor, "holdout_floor_C": holdout_floor,
+                 "known_sigma": known_sigma, "seed": seed}
         return {"run.csv": run, "holdout.csv": holdout, "model.toml": model}, truth
     return None, {"kinds": kinds, "strength": strength}
+
+
+def renamed(value, names):
+    if isinstance(value, dict):
+        return {key: renamed(one, names) for key, one in value.items()}
+    if isinstance(value, list):
+        return [renamed(one, names) for one in value]
+    return names.get(value, value) if isinstance(value, str) else value
 
 
 def neighbours(setup, name):
