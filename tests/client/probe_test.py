@@ -61,6 +61,14 @@ def floats_with_swapped_words_are_read_rightly():
         assert is_accepted(result).count("[[channel]]") == 16
 
 
+def units_of_unequal_size_as_three_by_six_has_them():
+    with Simulator("--units", "6,6,4") as sim:
+        result = probe("tcp", "127.0.0.1", "--port", str(sim.port), "--units", "1-4")
+    assert [unit["unit_id"] for unit in result["units"]] == [1, 2, 3], result["units"]
+    explained = is_accepted(result)
+    assert explained.count("[[channel]]") == 16 and explained.count("[[unit]]") == 3, explained
+
+
 def over_a_serial_line():
     with Simulator("--rtu", "--units", "4,4,4,4") as sim:
         result = probe("rtu", sim.path, "--baud", "9600", "--parity", "N", "--units", "1-5", "--timeout-ms", "100")
@@ -116,5 +124,6 @@ def nobody_there_ends_in_time_and_says_so():
 
 
 if __name__ == "__main__":
-    run([a_module_of_two_units_is_recognised_by_its_types, floats_with_swapped_words_are_read_rightly, over_a_serial_line,
+    run([a_module_of_two_units_is_recognised_by_its_types, floats_with_swapped_words_are_read_rightly,
+         units_of_unequal_size_as_three_by_six_has_them, over_a_serial_line,
          resistances_of_a_foreign_module_are_shown_as_temperatures, nobody_there_ends_in_time_and_says_so])

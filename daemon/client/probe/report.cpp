@@ -101,7 +101,8 @@ json unit_json(const ProbedUnit& unit) {
             {"blocks", std::move(blocks)}};
 }
 
-/// The profile that a unit is to be read by: a shipped one that fits whole, else the best reading.
+/// The profile that a unit is to be read by: a shipped one that fits whole and leaves no more than a quarter
+/// of what reads like temperatures unread (4 of 6 inputs is another module), else the best reading.
 struct Choice {
     const ProbedUnit* unit = nullptr;
     ModuleProfile profile;
@@ -112,9 +113,10 @@ std::optional<Choice> choose(const ProbedUnit& unit) {
     const auto temperature = std::ranges::find(unit.readings, false, &Reading::is_resistance);
     if (!unit.fits.empty()) {
         const ProfileFit& best = unit.fits.front();
-        const bool covers = temperature == unit.readings.end() ||
-                            best.profile.inputs * registers_per_value(best.profile.type) * 2 >=
-                                temperature->profile.inputs * registers_per_value(temperature->profile.type);
+        const bool covers =
+            temperature == unit.readings.end() ||
+            best.profile.inputs * registers_per_value(best.profile.type) * 4 >=
+                temperature->profile.inputs * registers_per_value(temperature->profile.type) * 3;
         if (best.types_confirmed || (best.fit >= 0.6 && covers)) return Choice{&unit, best.profile, true};
     }
     if (temperature == unit.readings.end()) return std::nullopt;
