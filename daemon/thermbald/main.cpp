@@ -66,9 +66,9 @@ void leave_signals_to_the_loop() {
     std::signal(SIGXFSZ, SIG_IGN);
 }
 
-/// An identification takes some megabytes for a second; without this they are kept for good, and a daemon that
-/// runs for weeks looks as if it leaked. As many heaps as there are threads: two threads on one heap wait for
-/// each other, and a scan would wait for a computation that the host keeps from running.
+/// An identification takes some megabytes for a second; without this they are kept for good, and a daemon
+/// that runs for weeks looks as if it leaked. As many heaps as there are threads: two threads on one heap
+/// wait for each other, and a scan would wait for a computation that the host keeps from running.
 void give_memory_back(const Config& config) {
     const auto threads = static_cast<int>(config.lines.size()) + config.identification.workers + 4;
     mallopt(M_ARENA_MAX, threads);
