@@ -28,7 +28,7 @@ struct StoreOptions {
     bool set_aside_damaged = true;  ///< a damaged file is renamed and a new one begun; otherwise `stop`
     /// A larger file is not read through before it is opened: a restart in a test must not cost scans. Its
     /// owner checks it beside the scans (FileCheck).
-    std::uintmax_t checked_at_once_bytes = 4 * 1024 * 1024;
+    std::uintmax_t checked_at_once_bytes = 4'194'304;
 };
 
 /// What the daemon knows of its latest test without asking the database. id 0: there is none.
