@@ -41,16 +41,22 @@ Result<SvrPrediction> predict_at(const LagFit& fit, std::span<const double> filt
 
 }  // namespace
 
-Result<ChannelSweep> sweep_channel(std::span<const double> samples_C, double start_s, double period_s,
-                                   const FlowOptions& options, const ParallelFor& parallel_for,
-                                   const std::function<bool()>& cancelled) {
+Result<FilteredSamples> filtered_samples(std::span<const double> samples_C, const FlowOptions& options) {
     const auto marked = mark_outliers(samples_C, options.outliers);
     if (!marked) return std::unexpected(marked.error());
     const auto filled = fill_short_gaps(marked->values_C, options.gaps);
     if (!filled) return std::unexpected(filled.error());
-    const auto filtered = denoise(filled->values_C, options.filter);
+    auto filtered = denoise(filled->values_C, options.filter);
     if (!filtered) return std::unexpected(filtered.error());
-    const std::vector<double>& filtered_C = filtered->values_C;
+    return FilteredSamples{static_cast<std::size_t>(filled->first), std::move(filtered->values_C)};
+}
+
+Result<ChannelSweep> sweep_channel(std::span<const double> samples_C, double start_s, double period_s,
+                                   const FlowOptions& options, const ParallelFor& parallel_for,
+                                   const std::function<bool()>& cancelled) {
+    const auto filtered = filtered_samples(samples_C, options);
+    if (!filtered) return std::unexpected(filtered.error());
+    const std::vector<double>& filtered_C = filtered->temperature_C;
     const auto swept = sweep(filtered_C, options.sweep, parallel_for, cancelled);
     if (!swept) return std::unexpected(swept.error());
 
@@ -59,7 +65,7 @@ Result<ChannelSweep> sweep_channel(std::span<const double> samples_C, double sta
     result.minimum = find_minimum(result.rmse_by_n_C, options.criterion);
     if (result.minimum.n > 0) {
         const LagFit& fit = swept->by_lag[static_cast<std::size_t>(result.minimum.n) - 1];
-        const double first_s = start_s + static_cast<double>(filled->first) * period_s;
+        const double first_s = start_s + static_cast<double>(filtered->first) * period_s;
         auto svr = predict_at(fit, filtered_C, first_s, period_s, options.sweep);
         if (!svr) return std::unexpected(svr.error());
         result.svr = *svr;

@@ -9,6 +9,14 @@
 
 namespace thermbal {
 
+/// A channel as the regression sees it: outliers taken out, short gaps filled, denoised.
+struct FilteredSamples {
+    std::size_t first = 0;  ///< sample of the channel that temperature_C begins with
+    std::vector<double> temperature_C;
+};
+/// Errors (refuse_input): the samples do not allow it (long gaps, too few).
+Result<FilteredSamples> filtered_samples(std::span<const double> samples_C, const FlowOptions& options);
+
 /// Outliers, gaps, wavelet filter, SVR sweep over n, minimum of RMSE over n, prediction at that n. `start_s`
 /// is the time of the first sample since the start of the test. Errors: refuse_input where the channel's
 /// samples do not allow it (gaps, flat), stop when cancelled.

@@ -9,6 +9,7 @@
 #include "channel_sweep.hpp"
 #include "guards.hpp"
 #include "kalman_prediction.hpp"
+#include "regime_estimate.hpp"
 
 namespace thermbal {
 
@@ -114,20 +115,10 @@ Result<ChannelSweep> LiveFlow::swept(const TestWindow& since, const std::string&
 
 const Result<ArchivedEstimate>& LiveFlow::estimate(const TestWindow& regime,
                                                    const std::vector<double>& start_level_C) {
-    const auto compute = [&]() -> Result<ArchivedEstimate> {
-        if (options_.prior) {
-            return estimate_with_archive(regime, options_.ambient, *options_.prior, options_.spectrum,
-                                         options_.seed, start_level_C);
-        }
-        auto plain = estimate_spectrum(regime, options_.ambient, std::nullopt, options_.spectrum,
-                                       options_.seed, start_level_C);
-        if (!plain) return std::unexpected(plain.error());
-        return ArchivedEstimate{std::move(*plain), {}};
-    };
     const std::pair key = window_key(regime);
     const auto known = estimates_.find(key);
     if (known != estimates_.end()) return known->second;
-    return estimates_.emplace(key, compute()).first->second;
+    return estimates_.emplace(key, estimate_regime(regime, start_level_C, options_)).first->second;
 }
 
 }  // namespace thermbal

@@ -2,6 +2,7 @@
 
 #include "ask.hpp"
 #include "commands.hpp"
+#include "dashboard_command.hpp"
 #include "watch.hpp"
 
 namespace thermbal {
@@ -41,10 +42,32 @@ void add_watch(CLI::App& app, int& status) {
     const Command command = add_command(app, "watch", "watch all channels live",
                                         "one JSON document a line: {\"topic\": ..., \"params\": ...}");
     command.app->footer(
-        "In a terminal a full screen: arrow keys and Enter show one channel, e the events, q quits. Piped, "
+        "In a terminal a full screen: arrow keys and Enter show one channel, e the events, ? the keys, q quits. Piped, "
         "one line a\n"
         "scan and an event. Goes on when the daemon restarts. NO_COLOR=1 turns colours off.");
     command.app->callback([&status, ask = command.ask] { status = run_watch(*ask); });
+}
+
+void add_dashboard(CLI::App& app, int& status) {
+    const auto command = keep<DashboardCommand>();
+    command->socket = default_socket;
+    CLI::App& dashboard = *app.add_subcommand("dashboard", "a web page on the running test, live, read only");
+    dashboard.group(group);
+    dashboard.add_option("--socket", command->socket, "the daemon's Unix socket")
+        ->capture_default_str()
+        ->envname("THERMBAL_SOCKET");
+    dashboard.add_option("--listen", command->listen, "ADDRESS:PORT; port 0: a free one")
+        ->capture_default_str();
+    dashboard.add_flag("--beyond-this-machine", command->beyond_this_machine,
+                       "an address that is not loopback is meant; needs --token-file, and is not encrypted");
+    dashboard.add_option("--token-file", command->token_file,
+                         "file with the token that a reader has to give: /?token=...");
+    dashboard.add_option("--host", command->hosts,
+                         "a further name that the page is opened under; several times for several");
+    dashboard.add_option("--most-readers", command->most_readers, "pages open at the same time")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100));
+    dashboard.callback([&status, command] { status = run_dashboard(*command); });
 }
 
 void add_curve(CLI::App& app, int& status) {
@@ -115,6 +138,7 @@ void add_annotate(CLI::App& app, int& status) {
 
 void add_daemon_commands(CLI::App& app, int& status) {
     add_watch(app, status);
+    add_dashboard(app, status);
     add_simple(app, status, "status", "state of the daemon and of its test", run_status);
     add_simple(app, status, "channels", "all channels: value, rise, rate, prediction, state", run_channels);
     add_simple(app, status, "predictions", "where each channel will settle, how sure, and why",

@@ -31,22 +31,6 @@ Result<std::string> database_path(const DatabaseOptions& options) {
     return path;
 }
 
-Result<TestId> wanted_test(const Reader& reader, std::optional<std::int64_t> test) {
-    if (test) return *test;
-    const auto newest = reader.newest_test();
-    if (!newest) return std::unexpected(newest.error());
-    if (!*newest) return fail(NextStep::refuse_input, "the database holds no test yet");
-    return (*newest)->id;
-}
-
-std::string local_time(std::int64_t wall_ns) {
-    const auto seconds = static_cast<std::time_t>(wall_ns / 1'000'000'000);
-    std::tm local{};
-    std::array<char, 32> buffer{};
-    if (localtime_r(&seconds, &local) == nullptr) return "-";
-    return {buffer.data(), std::strftime(buffer.data(), buffer.size(), "%F %T", &local)};
-}
-
 json test_json(const StoredTest& test) {
     const TestRecord& record = test.record;
     return {{"id", test.id},
@@ -63,6 +47,22 @@ json test_json(const StoredTest& test) {
 }
 
 }  // namespace
+
+Result<TestId> wanted_test(const Reader& reader, std::optional<std::int64_t> test) {
+    if (test) return *test;
+    const auto newest = reader.newest_test();
+    if (!newest) return std::unexpected(newest.error());
+    if (!*newest) return fail(NextStep::refuse_input, "the database holds no test yet");
+    return (*newest)->id;
+}
+
+std::string local_time(std::int64_t wall_ns) {
+    const auto seconds = static_cast<std::time_t>(wall_ns / 1'000'000'000);
+    std::tm local{};
+    std::array<char, 32> buffer{};
+    if (localtime_r(&seconds, &local) == nullptr) return "-";
+    return {buffer.data(), std::strftime(buffer.data(), buffer.size(), "%F %T", &local)};
+}
 
 Result<Reader> open_database(const DatabaseOptions& options) {
     const auto path = database_path(options);

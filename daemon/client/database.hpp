@@ -19,6 +19,12 @@ Result<Reader> open_database(const DatabaseOptions& options);
 
 // On the database itself, beside a running daemon or without one. Each returns the exit status.
 
+/// The id that is asked for, else the newest test's. Errors (refuse_input): there is none yet.
+Result<TestId> wanted_test(const Reader& reader, std::optional<std::int64_t> test);
+
+/// "2026-11-22 06:35:00" in the zone of this machine.
+std::string local_time(std::int64_t wall_ns);
+
 /// The stored tests, newest first.
 int run_tests(const DatabaseOptions& options);
 

@@ -59,15 +59,17 @@ void LiveFeed::lose(const Error& error) {
     trouble_ = error.message;
 }
 
-bool LiveFeed::refresh(json& target, const char* method, const json& params) {
-    if (!client_) return false;
+Result<json> LiveFeed::ask(const char* method, const json& params) {
+    if (!client_) return fail(NextStep::reopen_link, trouble_);
     auto answer = client_->ask(method, params, answer_limit);
-    if (answer) {
-        target = std::move(*answer);
-        return true;
-    }
-    if (answer.error().next == NextStep::reopen_link) lose(answer.error());
-    return false;
+    if (!answer && answer.error().next == NextStep::reopen_link) lose(answer.error());
+    return answer;
+}
+
+bool LiveFeed::refresh(json& target, const char* method, const json& params) {
+    auto answer = ask(method, params);
+    if (answer) target = std::move(*answer);
+    return answer.has_value();
 }
 
 void LiveFeed::refresh_curve() {

@@ -32,6 +32,9 @@ class LiveFeed {
     /// Asks for the curve of the chosen channel.
     void refresh_curve();
 
+    /// Asks the daemon beside what is kept. Errors: those of SocketClient; reopen_link while it is away.
+    Result<nlohmann::json> ask(const char* method, const nlohmann::json& params = nlohmann::json::object());
+
     /// The scene, with its ages as of now.
     WatchScene& scene();
 
@@ -40,7 +43,7 @@ class LiveFeed {
     Result<void> fill();
     void take(const Notification& notification);
     void take_event(const nlohmann::json& event);
-    /// Into `target` when the daemon answers; a broken connection is dropped.
+    /// Into `target` when the daemon answers.
     bool refresh(nlohmann::json& target, const char* method,
                  const nlohmann::json& params = nlohmann::json::object());
     void lose(const Error& error);

@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
     int status = 0;
     thermbal::add_daemon_commands(app, status);
     thermbal::add_database_commands(app, status);
+    thermbal::add_report_command(app, status);
     thermbal::add_probe_command(app, status);
     thermbal::add_offline_commands(app, status);
     thermbal::add_model_commands(app, status);

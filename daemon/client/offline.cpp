@@ -9,10 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "compute/threads.hpp"
-#include "declaration/declarations.hpp"
-#include "declaration/stop_rule.hpp"
 #include "offline_input.hpp"
 #include "output.hpp"
+#include "replay.hpp"
 #include "report/spectrum_json.hpp"
 #include "report/verdict_json.hpp"
 #include "series/sample.hpp"
@@ -116,74 +115,37 @@ int run_learn(const LearnOptions& options) {
 int run_replay(const OfflineOptions& options) {
     const auto input = read_input(options);
     if (!input) return report_error(input.error());
-    const ParallelFor parallel_for = parallel_on_threads(options.threads, false);
-    LiveFlow flow(input->flow);
-    Declarations declarations;
-    json changes = json::array();
-    std::string archive_dropped;
-    double stopped_at_min = no_value;
-    StopDecision decision;
-    const double end_min = input->window.end_s() / 60.0;
-    const double first_min = input->window.start_s / 60.0;
-    for (double until_min = first_min + options.every_min; until_min <= end_min + 1e-9;
-         until_min += options.every_min) {
-        const TestWindow window = window_until(input->window, until_min * 60.0);
-        const auto verdict =
-            flow.identify(window, declarations.declared_channels(), parallel_for, not_cancelled);
-        if (!verdict && verdict.error().next == NextStep::refuse_input) return report_error(verdict.error());
-        if (!verdict) continue;
-        if (archive_dropped.empty() && !verdict->archive_dropped.empty()) {
-            archive_dropped = verdict->archive_dropped;
-            fmt::print(stderr, "thermbalctl: at {:.2f} min: {}\n", verdict->window_end_min, archive_dropped);
-        }
-        for (const DeclarationChange& change :
-             declarations.update(verdict->channels, verdict->regime_since_min)) {
-            const bool declared = change.kind == DeclarationChange::Kind::declared;
-            changes.push_back({{"at_min", verdict->window_end_min},
-                               {"channel", change.channel},
-                               {"change", declared ? "declared" : "withdrawn"},
-                               {"reason", change.reason}});
-            if (!options.json) {
-                fmt::print("{:7.2f} min  {} {}: {}\n", verdict->window_end_min, change.channel,
-                           declared ? "declared" : "withdrawn", change.reason);
-            }
-        }
-        decision =
-            decide_stop(declarations.standing(), std::vector<bool>(declarations.standing().size(), true));
-        if (decision.stop) {
-            stopped_at_min = verdict->window_end_min;
-            break;
-        }
-    }
-    // Of the channels that were not declared a person wants to see the curve too.
-    std::vector<ChannelVerdict> last = declarations.standing();
-    if (!decision.stop && !options.modes_only) {
-        FlowOptions everything = input->flow;
-        everything.sweep_when = SweepWhen::always;
-        const auto verdict =
-            LiveFlow(everything)
-                .identify(input->window, declarations.declared_channels(), parallel_for, not_cancelled);
-        for (ChannelVerdict& channel : last) {
-            if (channel.declared() || !verdict) continue;
-            const auto whole =
-                std::ranges::find(verdict->channels, channel.channel, &ChannelVerdict::channel);
-            if (whole != verdict->channels.end() && !whole->declared()) channel = *whole;
-        }
-    }
+    const auto word = [](const ReplayChange& one) {
+        return one.change.kind == DeclarationChange::Kind::declared ? "declared" : "withdrawn";
+    };
+    const auto done = replay(*input, options, [&](const ReplayChange& one) {
+        if (options.json) return;
+        fmt::print("{:7.2f} min  {} {}: {}\n", one.at_min, one.change.channel, word(one), one.change.reason);
+    });
+    if (!done) return report_error(done.error());
     if (options.json) {
-        fmt::print("{}\n", json{{"test_stopped_at_min", number_or_null(stopped_at_min)},
-                                {"reason", decision.reason},
-                                {"archive_dropped", archive_dropped},
+        json changes = json::array();
+        for (const ReplayChange& one : done->changes) {
+            changes.push_back({{"at_min", one.at_min},
+                               {"channel", one.change.channel},
+                               {"change", word(one)},
+                               {"reason", one.change.reason}});
+        }
+        fmt::print("{}\n", json{{"test_stopped_at_min", number_or_null(done->stopped_at_min)},
+                                {"reason", done->decision.reason},
+                                {"archive_dropped", done->archive_dropped},
                                 {"changes", std::move(changes)},
-                                {"channels", channels_json(options, last)}}
+                                {"channels", channels_json(options, done->channels)}}
                                .dump(2));
-    } else {
-        print_table(options, last);
-        fmt::print("{}\n", std::isfinite(stopped_at_min)
-                               ? fmt::format("test stopped at {:.2f} of {:.2f} min: {}", stopped_at_min,
-                                             end_min, decision.reason)
-                               : fmt::format("test not stopped in {:.2f} min: {}", end_min, decision.reason));
+        return 0;
     }
+    const double end_min = input->window.end_s() / 60.0;
+    print_table(options, done->channels);
+    fmt::print("{}\n",
+               std::isfinite(done->stopped_at_min)
+                   ? fmt::format("test stopped at {:.2f} of {:.2f} min: {}", done->stopped_at_min, end_min,
+                                 done->decision.reason)
+                   : fmt::format("test not stopped in {:.2f} min: {}", end_min, done->decision.reason));
     return 0;
 }
 

@@ -20,6 +20,13 @@ std::string_view variable(const char* name) {
     return value == nullptr ? std::string_view() : value;
 }
 
+/// The few terminals that a person may still have without colours.
+bool has_colours(std::string_view terminal) {
+    const auto begins = [&](std::string_view name) { return terminal.starts_with(name); };
+    return !(begins("vt1") || begins("vt2") || begins("vt5") || terminal.ends_with("-mono") ||
+             terminal.ends_with("-m"));
+}
+
 }  // namespace
 
 int report_error(const Error& error) {
@@ -45,7 +52,7 @@ OutputStyle output_style() {
     const std::string_view terminal = variable("TERM");
     style.is_terminal = isatty(STDOUT_FILENO) == 1 && !terminal.empty() && terminal != "dumb";
     style.unicode = std::string_view(nl_langinfo(CODESET)) == "UTF-8";  // NOLINT(concurrency-mt-unsafe)
-    style.colour = style.is_terminal && variable("NO_COLOR").empty();
+    style.colour = style.is_terminal && variable("NO_COLOR").empty() && has_colours(terminal);
     winsize size{};
     if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0) style.columns = size.ws_col;
     return style;

@@ -62,25 +62,18 @@ int watch_as_lines(LiveFeed& feed, bool as_json) {
 
 // ---- a terminal ----
 
-enum class Key { none, quit, up, down, enter, back, events };
+enum class Key { none, quit, up, down, page_up, page_down, enter, back, events, help };
 
 /// The next key of what was typed; escape sequences of the arrow keys are one key.
 Key take_key(std::string_view& typed) {
-    constexpr std::array<std::pair<std::string_view, Key>, 15> keys = {{{"\x1b[A", Key::up},
-                                                                        {"\x1bOA", Key::up},
-                                                                        {"k", Key::up},
-                                                                        {"\x1b[B", Key::down},
-                                                                        {"\x1bOB", Key::down},
-                                                                        {"j", Key::down},
-                                                                        {"\r", Key::enter},
-                                                                        {"\n", Key::enter},
-                                                                        {"q", Key::quit},
-                                                                        {"Q", Key::quit},
-                                                                        {"\x04", Key::quit},
-                                                                        {"e", Key::events},
-                                                                        {"\x7f", Key::back},
-                                                                        {"\b", Key::back},
-                                                                        {"c", Key::back}}};
+    constexpr std::array<std::pair<std::string_view, Key>, 21> keys = {
+        {{"\x1b[A", Key::up},       {"\x1bOA", Key::up},   {"k", Key::up},
+         {"\x1b[B", Key::down},     {"\x1bOB", Key::down}, {"j", Key::down},
+         {"\r", Key::enter},        {"\n", Key::enter},    {"q", Key::quit},
+         {"Q", Key::quit},          {"\x04", Key::quit},   {"e", Key::events},
+         {"\x7f", Key::back},       {"\b", Key::back},     {"c", Key::back},
+         {"\x1b[5~", Key::page_up}, {"b", Key::page_up},   {"\x1b[6~", Key::page_down},
+         {" ", Key::page_down},     {"?", Key::help},      {"h", Key::help}}};
     for (const auto& [bytes, key] : keys) {
         if (!typed.starts_with(bytes)) continue;
         typed.remove_prefix(bytes.size());
@@ -94,8 +87,20 @@ Key take_key(std::string_view& typed) {
     return is_escape_alone ? Key::back : Key::none;
 }
 
+bool shows_channels(const WatchScene& scene) {
+    return scene.page == Page::channels || scene.page == Page::channel;
+}
+
+void scroll_events(WatchScene& scene, bool back, std::size_t count) {
+    if (scene.page != Page::events) return;
+    const std::size_t most = scene.events.empty() ? 0 : scene.events.size() - 1;
+    scene.events_back = back ? std::min(scene.events_back + count, most)
+                             : scene.events_back - std::min(scene.events_back, count);
+}
+
 /// False when the view is to be left.
 bool press(Key key, LiveFeed& feed) {
+    constexpr std::size_t events_a_page = 10;
     WatchScene& scene = feed.scene();
     const std::size_t channels = list(scene.channels, "channels").size();
     switch (key) {
@@ -105,9 +110,13 @@ bool press(Key key, LiveFeed& feed) {
             return false;
         case Key::events:
             scene.page = scene.page == Page::events ? Page::channels : Page::events;
+            scene.events_back = 0;
+            return true;
+        case Key::help:
+            scene.page = scene.page == Page::help ? Page::channels : Page::help;
             return true;
         case Key::enter:
-            if (scene.page == Page::events || channels == 0) return true;
+            if (!shows_channels(scene) || channels == 0) return true;
             scene.page = Page::channel;
             scene.chosen = scene.chosen.value_or(0);
             break;
@@ -115,9 +124,14 @@ bool press(Key key, LiveFeed& feed) {
             if (scene.page == Page::channels) scene.chosen.reset();
             scene.page = Page::channels;
             return true;
+        case Key::page_up:
+        case Key::page_down:
+            scroll_events(scene, key == Key::page_up, events_a_page);
+            return true;
         case Key::up:
         case Key::down:
-            if (scene.page == Page::events || channels == 0) return true;
+            scroll_events(scene, key == Key::up, 1);
+            if (!shows_channels(scene) || channels == 0) return true;
             if (!scene.chosen) {
                 scene.chosen = key == Key::down ? 0 : channels - 1;
             } else {

@@ -148,8 +148,10 @@ Ink ink_of_event(const json& event) {
 
 /// The newest that fit, oldest first. A message that is too long for one line is clipped.
 void put_events(Frame& frame, const WatchScene& scene, std::size_t rows) {
-    const std::size_t count = std::min(rows, scene.events.size());
-    for (std::size_t i = scene.events.size() - count; i < scene.events.size(); ++i) {
+    const std::size_t back = scene.page == WatchScene::Page::events ? scene.events_back : 0;
+    const std::size_t end = scene.events.size() - std::min(back, scene.events.size());
+    const std::size_t count = std::min(rows, end);
+    for (std::size_t i = end - count; i < end; ++i) {
         FrameLine line = frame.line();
         const Ink ink = ink_of_event(scene.events[i]);
         line.add(fmt::format("{:>10} ", event_time(scene.events[i])), ink == Ink::plain ? Ink::dim : ink);
@@ -178,9 +180,15 @@ void put_keys(Frame& frame, std::initializer_list<std::pair<std::string_view, st
     frame.put(line);
 }
 
+/// Where a chart's values are going: drawn behind the last of them to the right edge.
+struct Goal {
+    double low = NAN;
+    double high = NAN;
+};
+
 /// Columns of blocks, `height` rows: values from `low` (nothing) to `high` (all rows), `step` columns each.
 void put_chart(Frame& frame, const json& values, double low, double high, std::size_t height,
-               std::size_t step, std::size_t marked) {
+               std::size_t step, std::size_t marked, Goal goal = {}) {
     static constexpr std::array<std::string_view, 9> blocks = {" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
     for (std::size_t row = height; row-- > 0;) {
         FrameLine line = frame.line();
@@ -203,6 +211,10 @@ void put_chart(Frame& frame, const json& values, double low, double high, std::s
             line.add(repeated(block, step > 1 ? step - 1 : 1) + (step > 1 ? " " : ""),
                      i == marked ? Ink::good_bold : Ink::plain);
         }
+        const double row_high = (high - low) / static_cast<double>(height);
+        const double from = low + row_high * static_cast<double>(row);
+        if (goal.low <= from + row_high && goal.high >= from)
+            line.add(repeated(frame.unicode() ? "░" : ":", line.left()), Ink::good);
         frame.put(line);
     }
 }
@@ -234,10 +246,17 @@ std::size_t step_for(std::size_t count, std::size_t columns) {
 void put_recent(Frame& frame, const json& channel, std::size_t height) {
     const json& recent = list(channel, "recent_C");
     const Range range = range_of(recent);
-    put_rule(frame, "temperature since the start, C");
+    put_rule(frame, "temperature since the start, C; at the right where it settles, 90 %");
     if (!(range.low <= range.high)) return frame.put("  no good reading yet", Ink::dim);
-    put_chart(frame, recent, range.low, std::max(range.high, range.low + 0.5), height,
-              step_for(recent.size(), frame.columns()), recent.size());
+    const Goal goal{number(channel, "steady_state_low_C").value_or(NAN),
+                    number(channel, "steady_state_high_C").value_or(NAN)};
+    // A goal far away says that nothing is known yet; it must not press the course flat.
+    const bool near = goal.high <= range.high + 2.0 * (range.high - range.low);
+    const double top = std::fmax(std::max(range.high, range.low + 0.5), near ? goal.high : NAN);
+    constexpr std::size_t columns_for_goal = 10;
+    put_chart(frame, recent, range.low, top, height,
+              step_for(recent.size(), frame.columns() - std::min(frame.columns(), columns_for_goal)),
+              recent.size(), near ? goal : Goal{});
 }
 
 void put_curve(Frame& frame, const json& curve, std::size_t height) {
@@ -300,7 +319,35 @@ void put_channel_page(Frame& frame, const WatchScene& scene) {
             put_curve(frame, scene.curve, height);
         }
     }
-    put_keys(frame, {{"up/down", "other channel"}, {"Esc", "all channels"}, {"e", "events"}, {"q", "quit"}});
+    put_keys(frame, {{"up/down", "other channel"},
+                     {"Esc", "all channels"},
+                     {"e", "events"},
+                     {"?", "help"},
+                     {"q", "quit"}});
+}
+
+void put_help_page(Frame& frame) {
+    put_rule(frame, "keys");
+    const auto entry = [&](std::string_view key, std::string_view what, Ink ink = Ink::bold) {
+        FrameLine line = frame.line();
+        line.add(fmt::format(" {:<15}", key), ink);
+        line.add(what);
+        frame.put(line);
+    };
+    entry("up/down, k/j", "choose a channel; in the events: older, newer");
+    entry("Enter", "the channel: its course, where it settles and why, RMSE by n");
+    entry("e", "all events; space and b turn pages");
+    entry("Esc, c", "back to all channels");
+    entry("q", "quit; the test goes on");
+    frame.put("");
+    put_rule(frame, "what is shown");
+    entry("12.34", "declared: it settles here, proved, in its 90 % interval", Ink::good_bold);
+    entry("12.34", "the newest estimate: not proved yet, it may still move", Ink::dim);
+    entry("open, gap ...", "no reading: never a number that the sensor did not send", Ink::bad);
+    entry("left", "time until 95 % of the rise", Ink::dim);
+    entry("n, RMSE", "lags of the regression, and its error over the window", Ink::dim);
+    entry("trend", "since the start of the test, each channel on its own scale", Ink::dim);
+    put_keys(frame, {{"Esc", "all channels"}, {"q", "quit"}});
 }
 
 void put_channels_page(Frame& frame, const WatchScene& scene) {
@@ -315,7 +362,8 @@ void put_channels_page(Frame& frame, const WatchScene& scene) {
         put_rule(frame, "events");
         put_events(frame, scene, frame.rows_left() - 1);
     }
-    put_keys(frame, {{"up/down", "choose"}, {"Enter", "channel"}, {"e", "events"}, {"q", "quit"}});
+    put_keys(frame,
+             {{"up/down", "choose"}, {"Enter", "channel"}, {"e", "events"}, {"?", "help"}, {"q", "quit"}});
 }
 
 }  // namespace
@@ -357,9 +405,15 @@ std::string render_frame(const WatchScene& scene, FrameSize size, FrameLook look
             put_channel_page(frame, scene);
             break;
         case WatchScene::Page::events:
-            put_rule(frame, "events");
+            put_rule(frame, scene.events_back == 0
+                                ? "events"
+                                : fmt::format("events, {} newer below", scene.events_back));
             put_events(frame, scene, frame.rows_left() > 1 ? frame.rows_left() - 1 : 0);
-            put_keys(frame, {{"Esc", "all channels"}, {"q", "quit"}});
+            put_keys(frame,
+                     {{"up/down", "older, newer"}, {"Esc", "all channels"}, {"?", "help"}, {"q", "quit"}});
+            break;
+        case WatchScene::Page::help:
+            put_help_page(frame);
             break;
     }
     return frame.str();

@@ -11,7 +11,7 @@ namespace thermbal {
 
 /// All that the live view shows, as the daemon sent it.
 struct WatchScene {
-    enum class Page { channels, channel, events };
+    enum class Page { channels, channel, events, help };
 
     nlohmann::json status;              ///< of the method `status`
     nlohmann::json channels;            ///< of the method `channels`
@@ -21,6 +21,7 @@ struct WatchScene {
     std::string trouble;                ///< why the figures are old; empty while the daemon answers
     Page page = Page::channels;
     std::optional<std::size_t> chosen;  ///< index into channels
+    std::size_t events_back = 0;        ///< how many of the newest events are scrolled away
 };
 
 struct FrameSize {

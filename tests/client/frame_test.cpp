@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "answers.hpp"
 #include "channel_columns.hpp"
 #include "columns.hpp"
 #include "fields.hpp"
@@ -42,7 +43,7 @@ class Frame : public ::testing::Test {
 };
 
 TEST_F(Frame, NoFrameIsLargerThanItsScreen) {
-    for (const Page page : {Page::channels, Page::channel, Page::events}) {
+    for (const Page page : {Page::channels, Page::channel, Page::events, Page::help}) {
         scene.page = page;
         scene.chosen = page == Page::channel ? std::optional<std::size_t>(15) : std::nullopt;
         for (const std::size_t columns : {1, 7, 20, 40, 79, 80, 81, 97, 100, 132, 160, 250}) {
@@ -137,7 +138,7 @@ TEST_F(Frame, ADaemonThatSaysNothingUsefulIsShownWithoutFigures) {
         strange.channels = odd;
         strange.curve = odd;
         strange.events = {odd, json(7)};
-        for (const Page page : {Page::channels, Page::channel, Page::events}) {
+        for (const Page page : {Page::channels, Page::channel, Page::events, Page::help}) {
             strange.page = page;
             EXPECT_THAT(render_frame(strange, {24, 80}, {true, true}), HasSubstr("thermbal"));
         }
@@ -157,6 +158,36 @@ TEST_F(Frame, TheChannelPageDrawsTheCurveWithItsMinimum) {
     EXPECT_THAT(bottom, HasSubstr("\x1b[1;32m"));
     const std::string plain = without_colours(bottom);
     EXPECT_EQ(std::ranges::count(plain, '\xe2'), 1 + 34 * 2);  // the axis, and 34 bars of 2 columns
+}
+
+TEST_F(Frame, TheChannelPageShowsWhereTheCourseGoes) {
+    scene.page = Page::channel;
+    scene.chosen = 4;
+    const std::string with_goal = render_frame(scene, {30, 120}, {false, true});
+    EXPECT_THAT(with_goal, HasSubstr("░░░"));
+    for (json& channel : scene.channels["channels"])
+        channel["steady_state_low_C"] = channel["steady_state_high_C"] = nullptr;
+    EXPECT_THAT(render_frame(scene, {30, 120}, {false, true}), Not(HasSubstr("░")));
+}
+
+TEST_F(Frame, HelpNamesTheKeysAndFitsTheSmallestUsualScreen) {
+    scene.page = Page::help;
+    const std::string help = render_frame(scene, {24, 80}, {false, true});
+    for (const char* key : {"up/down", "Enter", "Esc", "q ", "e "}) EXPECT_THAT(help, HasSubstr(key));
+    EXPECT_THAT(help, Not(HasSubstr("~")));
+    EXPECT_THAT(render_frame(scene, {24, 80}, {true, true}), HasSubstr("\x1b["));
+}
+
+TEST_F(Frame, OlderEventsAreReachedByScrolling) {
+    scene.page = Page::events;
+    const std::string newest = event_message(scene.events.back());
+    EXPECT_THAT(render_frame(scene, {24, 160}, {false, true}), HasSubstr(newest));
+    scene.events_back = 1;
+    const std::string scrolled = render_frame(scene, {24, 160}, {false, true});
+    EXPECT_THAT(scrolled, Not(HasSubstr(newest)));
+    EXPECT_THAT(scrolled, HasSubstr("1 newer below"));
+    scene.events_back = 1000;  // further than there is: an empty page, not a crash
+    EXPECT_THAT(render_frame(scene, {24, 160}, {false, true}), HasSubstr("events"));
 }
 
 TEST_F(Frame, ALineForEachScan) {

@@ -155,6 +155,9 @@ class Screen(Watch):
         self.keep("channel80x24")
         self.press("e")
         self.screen_with("annotation T13: door opened?[2J", gone="RMSE")
+        self.press("?")
+        self.screen_with("quit; the test goes on")
+        self.keep("help80x24")
         self.press("Escape")
         self.screen_with("choose")
 

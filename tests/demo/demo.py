@@ -137,6 +137,16 @@ def report(options, folder, real):
     return state == "stopped" and declared > 0
 
 
+def write_report(options, folder):
+    """The test as one HTML file, beside the programs; with --keep in that folder."""
+    page = (folder if options.keep else options.bin.parent) / "report.html"
+    done = subprocess.run([options.bin / "thermbalctl", "report", "--database", folder / "thermbal.db", "--out", page],
+                          capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(done.stderr)
+    print(f"the report, for any browser: {page.resolve()}")
+
+
 def main():
     options = arguments()
     real = truth(options)
@@ -156,6 +166,7 @@ def main():
         if daemon.wait(timeout=60) != 0:
             sys.exit(f"thermbald ended with status {daemon.returncode}")
         good = report(options, folder, real)
+        write_report(options, folder)
     finally:
         sim.terminate()
         sim.wait()
