@@ -42,7 +42,8 @@ void add_watch(CLI::App& app, int& status) {
     const Command command = add_command(app, "watch", "watch all channels live",
                                         "one JSON document a line: {\"topic\": ..., \"params\": ...}");
     command.app->footer(
-        "In a terminal a full screen: arrow keys and Enter show one channel, e the events, ? the keys, q quits. Piped, "
+        "In a terminal a full screen: arrow keys and Enter show one channel, e the events, ? the keys, q "
+        "quits. Piped, "
         "one line a\n"
         "scan and an event. Goes on when the daemon restarts. NO_COLOR=1 turns colours off.");
     command.app->callback([&status, ask = command.ask] { status = run_watch(*ask); });

@@ -33,6 +33,16 @@ std::vector<Quality> quality_of(const Column& column) {
     return quality;
 }
 
+/// The figures of a declaration that still stands.
+std::string declared_as(const Replay& done, const ReplayChange& declared) {
+    const auto found = std::ranges::find(done.channels, declared.change.channel, &ChannelVerdict::channel);
+    if (found == done.channels.end() || found->declared_at_min != declared.at_min)
+        return declared.change.reason;
+    return fmt::format("settles at {:.2f} C ({:.2f} to {:.2f} C), 95 % of the rise at {:.0f} min",
+                       found->steady_state_C, found->steady_state_low_C, found->steady_state_high_C,
+                       found->equilibrium_time_min);
+}
+
 void add_replay(TestReport& report, const Replay& done) {
     for (ReportChannel& channel : report.channels) {
         const auto found = std::ranges::find(done.channels, channel.name, &ChannelVerdict::channel);
@@ -40,8 +50,8 @@ void add_replay(TestReport& report, const Replay& done) {
     }
     for (const ReplayChange& one : done.changes) {
         const bool declared = one.change.kind == DeclarationChange::Kind::declared;
-        report.events.push_back(
-            {one.at_min, declared ? "declared" : "withdrawn", one.change.channel, one.change.reason});
+        report.events.push_back({one.at_min, declared ? "declared" : "withdrawn", one.change.channel,
+                                 declared ? declared_as(done, one) : one.change.reason});
     }
     report.end_reason =
         std::isfinite(done.stopped_at_min)
@@ -80,6 +90,7 @@ Result<TestReport> report_of_recording(const ReportOptions& options) {
                                    .required = !is_ambient,
                                    .quality = quality_of(column)});
     }
+    report.tolerance_share_of_rise = input->flow.tolerance_share_of_rise;
     report.window = std::move(input->window);
     add_replay(report, *done);
     add_courses(report, input->flow, parallel_on_threads(options.recording.threads, false));

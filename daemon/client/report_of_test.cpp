@@ -113,6 +113,7 @@ Result<TestReport> report_of_test(const Reader& reader, TestId id, const ReportO
     }
     FlowOptions flow;
     flow.tolerance_C = report.tolerance_C;
+    report.tolerance_share_of_rise = flow.tolerance_share_of_rise;
     const auto room = std::ranges::find(report.channels, true, &ReportChannel::is_ambient);
     flow.ambient = room == report.channels.end() ? "" : room->name;
     add_courses(report, flow, parallel_on_threads(options.recording.threads, false));

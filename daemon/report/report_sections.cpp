@@ -66,8 +66,8 @@ std::string channel_row(const TestReport& report, const ReportChannel& channel) 
     const bool declared = is_declared(channel);
     const std::string settles = degrees(verdict.steady_state_C);
     return fmt::format(
-        R"(<tr><td><b>{}</b></td><td class="place">{}</td><td class="number wide">{}</td><td class="number wide">{}</td><td class="number">{}</td><td class="number">{}</td><td class="number wide">{}</td><td class="number wide">{}</td><td class="number wide">{}</td><td class="{}">{}</td></tr>)",
-        escaped(channel.name), escaped(channel.place),
+        R"(<tr><td><b>{}</b><small class="phone">{}</small></td><td class="place wide">{}</td><td class="number wide">{}</td><td class="number wide">{}</td><td class="number">{}</td><td class="number">{}</td><td class="number wide">{}</td><td class="number wide">{}</td><td class="number wide">{}</td><td class="{}">{}</td></tr>)",
+        escaped(channel.name), escaped(channel.place), escaped(channel.place),
         degrees(measured == nullptr ? no_value : last_good(measured->values)),
         degrees(rise_C(report, channel)),
         declared ? "<b>" + settles + "</b>" : "<span class=\"quiet\">" + settles + "</span>",
@@ -241,7 +241,7 @@ std::string state_of(const ReportChannel& channel) {
 
 std::string channel_table(const TestReport& report) {
     std::string html =
-        R"(<h2>Channels</h2><div class="scroll"><table><thead><tr><th></th><th>place</th><th class="number wide">last &deg;C</th><th class="number wide">rise &deg;C</th><th class="number">settles at &deg;C</th><th class="number">90 % between</th><th class="number wide">95 % at</th><th class="number wide">n</th><th class="number wide">RMSE &deg;C</th><th>state</th></tr></thead><tbody>)";
+        R"(<h2>Channels</h2><div class="scroll"><table><thead><tr><th></th><th class="wide">place</th><th class="number wide">last &deg;C</th><th class="number wide">rise &deg;C</th><th class="number">settles at &deg;C</th><th class="number">90 % between</th><th class="number wide">95 % at</th><th class="number wide">n</th><th class="number wide">RMSE &deg;C</th><th>state</th></tr></thead><tbody>)";
     for (const ReportChannel& channel : report.channels) html += channel_row(report, channel);
     return html + "</tbody></table></div>";
 }
@@ -350,8 +350,10 @@ std::string events_section(const TestReport& report) {
 
 std::string provenance_section(const TestReport& report) {
     std::string html = "<h2>Where this comes from</h2><div class=\"card\"><dl>";
-    html += fmt::format("<dt>source</dt><dd>{}</dd><dt>tolerance</dt><dd>&plusmn;{:.6g} &deg;C</dd>",
-                        escaped(report.source), report.tolerance_C);
+    html += fmt::format(
+        "<dt>source</dt><dd>{}</dd><dt>asked for</dt><dd>a 90 % interval within &plusmn;{:.6g} &deg;C, or "
+        "{:.3g} % of the rise where that is more</dd>",
+        escaped(report.source), report.tolerance_C, 100.0 * report.tolerance_share_of_rise);
     for (const auto& [what, version] : report.versions)
         html += fmt::format("<dt>{}</dt><dd>{}</dd>", escaped(what), escaped(version));
     html +=

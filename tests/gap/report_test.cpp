@@ -47,9 +47,11 @@ TEST(GapReport, NeedsNothingElseAndEscapesNames) {
     const std::string html = gap_report_html(some_diagnosis());
     EXPECT_EQ(html.find("<b>.csv"), std::string::npos);
     EXPECT_NE(html.find("a&lt;b&gt;.csv"), std::string::npos);
-    for (const char* outside : {"http://", "https://", "<script src", "<link"})
+    for (const char* outside : {"<script src", "<link", "<img", "@import", "url(", "sourceMappingURL"})
         EXPECT_EQ(html.find(outside), std::string::npos);
     EXPECT_NE(html.find("<svg"), std::string::npos);
+    EXPECT_NE(html.find("data-plot=\"run0-0\""), std::string::npos);
+    EXPECT_NE(html.find("\"T1 after\":[20.1,20.1]"), std::string::npos);
     EXPECT_NE(html.find("a steady heat source that the model lacks, at bed"), std::string::npos);
 }
 

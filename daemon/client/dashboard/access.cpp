@@ -53,19 +53,19 @@ Result<ListenAddress> parse_listen_address(std::string_view text) {
     return address;
 }
 
-bool Access::allows_host(std::string_view host_header) const {
+bool PageAccess::allows_host(std::string_view host_header) const {
     return std::ranges::find(hosts, lower(host_of(host_header))) != hosts.end();
 }
 
-bool Access::allows_token(std::string_view given) const {
-    unsigned char differs = given.size() == token.size() ? 0 : 1;
+bool PageAccess::allows_token(std::string_view given) const {
+    unsigned differs = given.size() == token.size() ? 0 : 1;
     for (std::size_t i = 0; i < token.size(); ++i)
         differs |= static_cast<unsigned char>(token[i] ^ (i < given.size() ? given[i] : 0));
     return differs == 0;
 }
 
-Access access_for(const ListenAddress& address, std::vector<std::string> other_hosts, std::string token) {
-    Access access{{address.host}, std::move(token)};
+PageAccess access_for(const ListenAddress& address, std::vector<std::string> other_hosts, std::string token) {
+    PageAccess access{{address.host}, std::move(token)};
     if (address.is_loopback()) access.hosts.insert(access.hosts.end(), {"localhost", "127.0.0.1", "::1"});
     for (const std::string& host : other_hosts) access.hosts.push_back(lower(host));
     return access;

@@ -21,7 +21,7 @@ Result<ListenAddress> parse_listen_address(std::string_view text);
 /// Who may ask. A web page that a person has open elsewhere can send requests to this machine: it cannot
 /// choose the Host header, so a name that is not this server's is refused (DNS rebinding), and without the
 /// token nothing is answered where one is set.
-struct Access {
+struct PageAccess {
     std::vector<std::string> hosts;  ///< names and addresses, without port, that a Host header may have
     std::string token;               ///< empty: none is asked for
 
@@ -31,7 +31,7 @@ struct Access {
 };
 
 /// The hosts that go with an address to listen on, and those that a person names beside it.
-Access access_for(const ListenAddress& address, std::vector<std::string> other_hosts, std::string token);
+PageAccess access_for(const ListenAddress& address, std::vector<std::string> other_hosts, std::string token);
 
 /// The token in a file: its first line. Errors (refuse_input): not readable, readable by everybody, shorter
 /// than 16 characters or with others than letters, digits, '-', '_'.

@@ -2,7 +2,9 @@
 
 #include <atomic>
 #include <chrono>
+#include <memory>
 #include <string_view>
+#include <thread>
 
 #include <fmt/format.h>
 #include <httplib.h>

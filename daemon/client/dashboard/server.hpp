@@ -11,7 +11,7 @@ namespace thermbal {
 
 struct DashboardOptions {
     ListenAddress address{"127.0.0.1", 8087};
-    Access access;
+    PageAccess access;
     std::size_t most_readers = 16;  ///< pages open at the same time; a further one is told to try later
 };
 

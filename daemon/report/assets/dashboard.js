@@ -20,6 +20,16 @@
     return td;
   }
 
+  // On a phone the place stands below the name.
+  function named(channel) {
+    const td = document.createElement('td'), b = document.createElement('b'), small = document.createElement('small');
+    b.textContent = channel.channel;
+    small.textContent = channel.place || '';
+    small.className = 'phone';
+    td.append(b, small);
+    return td;
+  }
+
   function fact(value, what) {
     const div = document.createElement('div'), b = document.createElement('b'), span = document.createElement('span');
     b.textContent = value;
@@ -52,7 +62,7 @@
       const tr = document.createElement('tr');
       const good = channel.quality === 'good', known = channel.state === 'declared';
       tr.append(
-        cell(channel.channel), cell(channel.place || '', 'place'),
+        named(channel), cell(channel.place || '', 'place wide'),
         cell(good ? fixed(channel.value_C) : words(channel.quality), good ? 'number' : 'number bad'),
         cell(good ? signed(channel.rate_C_per_h) : '-', 'number wide'),
         cell(fixed(channel.steady_state_C), known ? 'number good' : 'number quiet'),

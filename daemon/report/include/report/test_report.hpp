@@ -48,8 +48,9 @@ struct TestReport {
     std::string state = {};       ///< "stopped", "running", ...; "recording" for a file
     std::string end_reason = {};  ///< why it ended
     double tolerance_C = 0.2;
-    TestWindow window = {};           ///< what was measured
-    std::vector<double> time_s = {};  ///< the window's scans, and times beyond them for the courses
+    double tolerance_share_of_rise = 0.0;  ///< a channel may be known to this share of its rise instead
+    TestWindow window = {};                ///< what was measured
+    std::vector<double> time_s = {};       ///< the window's scans, and times beyond them for the courses
     std::vector<ReportChannel> channels = {};
     std::vector<std::pair<std::string, std::size_t>> scans =
         {};                                ///< how the scans went: "ok" 1200, "missed" 3
