@@ -109,9 +109,38 @@ std::string mark(const PlotMark& mark, const Axis& x, const Axis& y) {
         x.at(mark.x), y.from_px, y.to_px, x.at(mark.x) + 4, y.to_px + 9, escaped(mark.label));
 }
 
+using EndLabel = std::pair<double, std::string>;
+
+/// Sorted labels that would lie on each other become a stack about the middle of where they belong.
+void spread(std::vector<EndLabel>& labels, double bottom_px) {
+    struct Stack {
+        double top;
+        std::size_t first, count;
+        double height() const { return static_cast<double>(count) * line_height_px; }
+    };
+    std::vector<Stack> stacks;
+    for (std::size_t i = 0; i < labels.size(); ++i) {
+        stacks.push_back({labels[i].first, i, 1});
+        while (stacks.size() > 1) {
+            Stack& above = stacks[stacks.size() - 2];
+            const Stack below = stacks.back();
+            if (above.top + above.height() <= below.top) break;
+            const auto a = static_cast<double>(above.count), b = static_cast<double>(below.count);
+            above.top = (a * above.top + b * (below.top - above.height())) / (a + b);
+            above.count += below.count;
+            stacks.pop_back();
+        }
+    }
+    for (const Stack& stack : stacks) {
+        const double top = std::min(stack.top, bottom_px - stack.height() + line_height_px);
+        for (std::size_t i = 0; i < stack.count; ++i)
+            labels[stack.first + i].first = top + static_cast<double>(i) * line_height_px;
+    }
+}
+
 /// Names at the right ends, pushed apart where they would lie on each other.
 std::string end_labels(const Plot& plot, const PlotTable& table, const Axis& x, const Axis& y) {
-    std::vector<std::pair<double, std::string>> labels;
+    std::vector<EndLabel> labels;
     for (const PlotLine& line : plot.lines) {
         const Column* const column = table.column(line.column);
         if (column == nullptr) continue;
@@ -120,11 +149,7 @@ std::string end_labels(const Plot& plot, const PlotTable& table, const Axis& x, 
         if (last != column->values.rend()) labels.emplace_back(y.at(*last) + 4, line.label);
     }
     std::ranges::sort(labels);
-    for (std::size_t i = 1; i < labels.size(); ++i)
-        labels[i].first = std::max(labels[i].first, labels[i - 1].first + line_height_px);
-    double limit = y.from_px + 4;
-    for (std::size_t i = labels.size(); i-- > 0; limit -= line_height_px)
-        labels[i].first = std::min(labels[i].first, limit);
+    spread(labels, y.from_px + 4);
     std::string svg;
     for (const auto& [at, label] : labels)
         svg += fmt::format(R"(<text x="{:.0f}" y="{:.1f}">{}</text>)", x.to_px + 5, at, escaped(label));

@@ -69,7 +69,7 @@ class Page:
         return answer["result"].get("value")
 
     def until(self, script, limit_s=60):
-        self.browser.until(lambda: self.run(script), limit_s, script)
+        self.browser.until(lambda: self.run(f"!!({script})"), limit_s, script)
 
     def draw_everything(self):
         """Brings every figure into view, so that every plot is drawn."""

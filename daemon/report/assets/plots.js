@@ -63,6 +63,27 @@ const thermbalPlots = (() => {
     };
   }
 
+  // Sorted labels that would lie on each other become a stack about the middle of where they belong.
+  function spread(labels, apart, bottom) {
+    const stacks = [];
+    labels.forEach(label => {
+      stacks.push({top: label.at, labels: [label]});
+      for (let last = stacks.length - 1; last > 0; --last) {
+        const above = stacks[last - 1], below = stacks[last];
+        const needed = above.labels.length * apart;
+        if (above.top + needed <= below.top) break;
+        const a = above.labels.length, b = below.labels.length;
+        above.top = (a * above.top + b * (below.top - needed)) / (a + b);
+        above.labels.push(...below.labels);
+        stacks.pop();
+      }
+    });
+    for (const stack of stacks) {
+      const top = Math.min(stack.top, bottom - (stack.labels.length - 1) * apart);
+      stack.labels.forEach((label, i) => { label.at = top + i * apart; });
+    }
+  }
+
   // Names at the right ends, pushed apart where they would lie on each other.
   function labelLines(figure, plot, graph) {
     if (!plot.label_lines) return;
@@ -78,9 +99,7 @@ const thermbalPlots = (() => {
       }
     });
     labels.sort((a, b) => a.at - b.at);
-    labels.forEach((label, i) => { if (i > 0) label.at = Math.max(label.at, labels[i - 1].at + apart); });
-    let limit = area.y + area.h;
-    for (let i = labels.length - 1; i >= 0; --i, limit -= apart) labels[i].at = Math.min(labels[i].at, limit);
+    spread(labels, apart, area.y + area.h);
     figure.querySelector('.ends').replaceChildren(...labels.map(label => {
       const span = document.createElement('span');
       span.textContent = label.text;
