@@ -112,7 +112,7 @@ std::string mark(const PlotMark& mark, const Axis& x, const Axis& y) {
 using EndLabel = std::pair<double, std::string>;
 
 /// Sorted labels that would lie on each other become a stack about the middle of where they belong.
-void spread(std::vector<EndLabel>& labels, double bottom_px) {
+void spread(std::vector<EndLabel>& labels, double lowest_px) {
     struct Stack {
         double top;
         std::size_t first, count;
@@ -132,7 +132,7 @@ void spread(std::vector<EndLabel>& labels, double bottom_px) {
         }
     }
     for (const Stack& stack : stacks) {
-        const double top = std::min(stack.top, bottom_px - stack.height() + line_height_px);
+        const double top = std::min(stack.top, lowest_px - stack.height() + line_height_px);
         for (std::size_t i = 0; i < stack.count; ++i)
             labels[stack.first + i].first = top + static_cast<double>(i) * line_height_px;
     }
