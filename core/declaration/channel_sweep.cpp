@@ -39,7 +39,21 @@ Result<SvrPrediction> predict_at(const LagFit& fit, std::span<const double> filt
     return svr;
 }
 
+double last_sweep_length_s(const TestWindow& window, const FlowOptions& options) {
+    const double shortest_s = options.guards.shortest_window_min * 60.0;
+    const double length_s = window.end_s() - window.start_s;
+    if (length_s <= shortest_s || options.sweep_growth <= 0.0) return length_s;
+    const double steps = std::floor(std::log(length_s / shortest_s) / std::log1p(options.sweep_growth));
+    return shortest_s * std::pow(1.0 + options.sweep_growth, steps);
+}
+
 }  // namespace
+
+TestWindow swept_window(const TestWindow& since, const FlowOptions& options) {
+    return options.sweep_when == SweepWhen::needed
+               ? window_until(since, since.start_s + last_sweep_length_s(since, options))
+               : since;
+}
 
 Result<FilteredSamples> filtered_samples(std::span<const double> samples_C, const FlowOptions& options) {
     const auto marked = mark_outliers(samples_C, options.outliers);

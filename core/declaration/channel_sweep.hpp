@@ -17,6 +17,10 @@ struct FilteredSamples {
 /// Errors (refuse_input): the samples do not allow it (long gaps, too few).
 Result<FilteredSamples> filtered_samples(std::span<const double> samples_C, const FlowOptions& options);
 
+/// What of a regime's window the sweep sees: with SweepWhen::needed the longest of those that each are
+/// `sweep_growth` longer than the one before, otherwise all.
+TestWindow swept_window(const TestWindow& since, const FlowOptions& options);
+
 /// Outliers, gaps, wavelet filter, SVR sweep over n, minimum of RMSE over n, prediction at that n. `start_s`
 /// is the time of the first sample since the start of the test. Errors: refuse_input where the channel's
 /// samples do not allow it (gaps, flat), stop when cancelled.

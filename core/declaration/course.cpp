@@ -38,13 +38,14 @@ Result<RegressionCourse> regression_course(const TestWindow& window, const SvrPr
                                            const std::string& channel, std::size_t scans_after,
                                            const FlowOptions& options) {
     const Regime regime = current_regime(window, options);
-    const Column* const samples = regime.window.channel(channel);
+    const TestWindow seen = swept_window(regime.window, options);
+    const Column* const samples = seen.channel(channel);
     if (samples == nullptr || at.n < 1)
         return fail(NextStep::refuse_input, fmt::format("{}: no regression on this window", channel));
     const auto filtered = filtered_samples(samples->values, options);
     if (!filtered) return std::unexpected(filtered.error());
-    auto run = predict(filtered->temperature_C, static_cast<std::size_t>(at.n), at.C, at.sigma, scans_after,
-                       options.sweep);
+    auto run = predict(filtered->temperature_C, static_cast<std::size_t>(at.n), at.C, at.sigma,
+                       scans_after + window.scans - seen.scans, options.sweep);
     if (!run) return std::unexpected(run.error());
     const double period_s = regime.window.period_s;
     RegressionCourse course{regime.window.start_s + static_cast<double>(filtered->first) * period_s, period_s,

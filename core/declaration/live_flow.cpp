@@ -19,15 +19,6 @@ std::pair<std::int64_t, std::size_t> window_key(const TestWindow& window) {
     return {std::llround(window.start_s * 1e3), window.scans};
 }
 
-/// The longest window, of those that each are `sweep_growth` longer than the one before, that is in this one.
-double last_sweep_length_s(const TestWindow& window, const FlowOptions& options) {
-    const double shortest_s = options.guards.shortest_window_min * 60.0;
-    const double length_s = window.end_s() - window.start_s;
-    if (length_s <= shortest_s || options.sweep_growth <= 0.0) return length_s;
-    const double steps = std::floor(std::log(length_s / shortest_s) / std::log1p(options.sweep_growth));
-    return shortest_s * std::pow(1.0 + options.sweep_growth, steps);
-}
-
 }  // namespace
 
 Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::set<std::string>& settled,
@@ -101,9 +92,7 @@ bool LiveFlow::sweep_is_wanted(const ChannelVerdict& channel) const {
 Result<ChannelSweep> LiveFlow::swept(const TestWindow& since, const std::string& channel,
                                      const ParallelFor& parallel_for,
                                      const std::function<bool()>& cancelled) {
-    const TestWindow seen = options_.sweep_when == SweepWhen::needed
-                                ? window_until(since, since.start_s + last_sweep_length_s(since, options_))
-                                : since;
+    const TestWindow seen = swept_window(since, options_);
     const std::pair key = window_key(seen);
     const auto known = sweeps_.find(channel);
     if (known != sweeps_.end() && known->second.window == key) return known->second.result;

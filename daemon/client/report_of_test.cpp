@@ -17,14 +17,18 @@ using nlohmann::json;
 
 constexpr std::int64_t most_events = 400;
 
-/// What stood in the configuration of that day; the default where it does not say.
-double configured_tolerance_C(const std::string& config_toml) {
-    const double usual_C = FlowOptions{}.tolerance_C;
+/// As the configuration of that day had it; the daemon's defaults where it does not say.
+FlowOptions configured_flow(const std::string& config_toml) {
+    FlowOptions flow;
+    bool sweep_always = true;
     try {
-        return toml::parse(config_toml)["identification"]["tolerance_C"].value_or(usual_C);
-    } catch (const toml::parse_error&) {
-        return usual_C;
+        const toml::table config = toml::parse(config_toml);
+        flow.tolerance_C = config["identification"]["tolerance_C"].value_or(flow.tolerance_C);
+        sweep_always = config["identification"]["sweep_always"].value_or(sweep_always);
+    } catch (const toml::parse_error&) {  // a test is shown whatever its configuration looked like
     }
+    if (sweep_always) flow.sweep_when = SweepWhen::always;
+    return flow;
 }
 
 std::optional<ChannelVerdict> verdict_in(const std::string& stored) {
@@ -95,13 +99,15 @@ Result<TestReport> report_of_test(const Reader& reader, TestId id, const ReportO
     const auto stored = reader.test(id);
     if (!stored) return std::unexpected(stored.error());
     const TestRecord& record = stored->record;
+    FlowOptions flow = configured_flow(record.config_toml);
     TestReport report{.name = record.name,
                       .machine = record.machine,
                       .source = fmt::format("test {}", id),
                       .started = local_time(record.started.wall_ns),
                       .state = std::string(to_string(stored->state)),
                       .end_reason = stored->stop_reason,
-                      .tolerance_C = configured_tolerance_C(record.config_toml)};
+                      .tolerance_C = flow.tolerance_C,
+                      .tolerance_share_of_rise = flow.tolerance_share_of_rise};
     auto window = reader.window(id);
     if (!window) return std::unexpected(window.error());
     report.window = std::move(*window);
@@ -111,9 +117,6 @@ Result<TestReport> report_of_test(const Reader& reader, TestId id, const ReportO
     for (const auto& add : {add_verdicts, add_scans, add_events}) {
         if (auto added = add(report, reader, id); !added) return std::unexpected(added.error());
     }
-    FlowOptions flow;
-    flow.tolerance_C = report.tolerance_C;
-    report.tolerance_share_of_rise = flow.tolerance_share_of_rise;
     const auto room = std::ranges::find(report.channels, true, &ReportChannel::is_ambient);
     flow.ambient = room == report.channels.end() ? "" : room->name;
     add_courses(report, flow, parallel_on_threads(options.recording.threads, false));
