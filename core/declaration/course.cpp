@@ -45,7 +45,7 @@ Result<RegressionCourse> regression_course(const TestWindow& window, const SvrPr
     const auto filtered = filtered_samples(samples->values, options);
     if (!filtered) return std::unexpected(filtered.error());
     auto run = predict(filtered->temperature_C, static_cast<std::size_t>(at.n), at.C, at.sigma,
-                       scans_after + window.scans - seen.scans, options.sweep);
+                       scans_after + regime.window.scans - seen.scans, options.sweep);
     if (!run) return std::unexpected(run.error());
     const double period_s = regime.window.period_s;
     RegressionCourse course{regime.window.start_s + static_cast<double>(filtered->first) * period_s, period_s,
