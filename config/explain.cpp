@@ -6,6 +6,7 @@
 #include <fmt/ranges.h>
 
 #include "config/load.hpp"
+#include "mqtt.hpp"
 #include "toml_reader.hpp"
 
 namespace thermbal {
@@ -142,6 +143,7 @@ std::string explain_config(const Config& config) {
         identification.tolerance_C, identification.max_lag, identification.every_s,
         identification.sweep_always, identification.workers);
     text += explain_stop(config);
+    if (config.mqtt) text += explain_mqtt(*config.mqtt);
     for (const LineConfig& line : config.lines) text += explain_line(line);
     for (const UnitConfig& unit : config.units) text += explain_unit(config, unit);
     for (const ChannelConfig& channel : config.channels) text += explain_channel(config, channel);

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "checks.hpp"
+#include "mqtt.hpp"
 #include "toml_reader.hpp"
 
 namespace thermbal {
@@ -45,6 +46,7 @@ class Loader {
         for (const toml::table* table : reader.tables("alarm")) read_alarm(*table);
         section(reader, "identification", &Loader::read_identification);
         section(reader, "stop", &Loader::read_stop);
+        section(reader, "mqtt", &Loader::read_mqtt_section);
         reader.finish();
         // Defaults stand where something was refused: what they would say about each other would be about
         // nothing.
@@ -355,6 +357,8 @@ class Loader {
         set(config_.stop.address, reader.integer("address", {0, 65535}));
         set(config_.stop.value, reader.integer("value", coil ? Range{0, 1} : Range{0, 65535}));
     }
+
+    void read_mqtt_section(TableReader& reader) { config_.mqtt = read_mqtt(reader); }
 
     const toml::table& root_;
     const ProfileLookup& lookup_;

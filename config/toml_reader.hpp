@@ -11,6 +11,7 @@
 #include <toml++/toml.h>
 
 #include "base/error.hpp"
+#include "config/quoted.hpp"
 
 namespace thermbal {
 
@@ -86,9 +87,6 @@ template <typename T>
 void set(T& field, const std::optional<T>& value) {
     if (value) field = *value;
 }
-
-/// A string as TOML writes it.
-std::string quoted(std::string_view text);
 
 /// The one of `candidates` that `word` was probably meant to be; empty when none is near.
 std::string nearest(std::string_view word, const std::set<std::string, std::less<>>& candidates);

@@ -15,6 +15,11 @@ void add_database_commands(CLI::App& app, int& status);
 void add_offline_commands(CLI::App& app, int& status);
 /// report.
 void add_report_command(CLI::App& app, int& status);
+/// new, demo.
+void add_new_command(CLI::App& app, int& status);
+void add_demo_command(CLI::App& app, int& status);
+/// metrics.
+void add_metrics_command(CLI::App& app, int& status);
 /// probe.
 void add_probe_command(CLI::App& app, int& status);
 /// simulate, calibrate.

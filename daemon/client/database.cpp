@@ -1,7 +1,9 @@
 #include "database.hpp"
 
+#include <algorithm>
 #include <array>
 #include <ctime>
+#include <filesystem>
 
 #include <fmt/format.h>
 
@@ -9,6 +11,7 @@
 #include "fields.hpp"
 #include "files.hpp"
 #include "output.hpp"
+#include "progress.hpp"
 #include "socket_client.hpp"
 #include "store/reader.hpp"
 
@@ -29,6 +32,13 @@ Result<std::string> database_path(const DatabaseOptions& options) {
     std::string path = text(*status, "database");
     if (path.empty()) return unknown("the daemon does not say");
     return path;
+}
+
+/// 0 for a file that is not there.
+double size_of(const std::filesystem::path& path) {
+    std::error_code error;
+    const auto size = std::filesystem::file_size(path, error);
+    return error ? 0.0 : static_cast<double>(size);
 }
 
 json test_json(const StoredTest& test) {
@@ -114,7 +124,9 @@ int run_export(const DatabaseOptions& options, std::optional<std::int64_t> test,
 int run_verify(const DatabaseOptions& options) {
     const auto reader = open_database(options);
     if (!reader) return report_error(reader.error());
+    std::optional<Progress> progress("verify");
     const auto findings = reader->verify();
+    progress.reset();
     if (!findings) return report_error(findings.error());
     if (options.ask.json) {
         json rows = json::array();
@@ -135,7 +147,13 @@ int run_verify(const DatabaseOptions& options) {
 int run_backup(const DatabaseOptions& options, const std::string& copy) {
     const auto reader = open_database(options);
     if (!reader) return report_error(reader.error());
-    if (const auto done = reader->backup(copy); !done) return report_error(done.error());
+    std::optional<Progress> progress("backup");
+    progress->follow([whole = size_of(reader->path()), copy] {
+        return whole > 0.0 ? std::min(1.0, size_of(copy) / whole) : -1.0;
+    });
+    const auto done = reader->backup(copy);
+    progress.reset();
+    if (!done) return report_error(done.error());
     return options.ask.json ? print_json({{"copy", copy}}) : print_text(fmt::format("copied to {}\n", copy));
 }
 

@@ -8,6 +8,7 @@
 #include "gap/diagnose.hpp"
 #include "model_input.hpp"
 #include "output.hpp"
+#include "progress.hpp"
 #include "report/diagnosis_json.hpp"
 #include "report/gap_report.hpp"
 
@@ -27,7 +28,9 @@ Result<Diagnosis> diagnosed(const DiagnoseCommand& command) {
     }
     DiagnoseOptions options;
     options.found_on = command.file;
-    return diagnose(*model, *test, holdouts, options, parallel_on_threads(command.threads, false));
+    Progress progress("diagnose");
+    return diagnose(*model, *test, holdouts, options,
+                    progress.counting(parallel_on_threads(command.threads, false)));
 }
 
 Result<void> write_results(const DiagnoseCommand& command, const Diagnosis& diagnosis) {

@@ -1,6 +1,7 @@
 #include <clocale>
 
 #include "commands.hpp"
+#include "manual/manual.hpp"
 #include "version.hpp"
 
 namespace {
@@ -23,12 +24,17 @@ int main(int argc, char** argv) {
     app.failure_message(one_line);
     app.require_subcommand(1);
     int status = 0;
+    thermbal::add_new_command(app, status);
+    thermbal::add_demo_command(app, status);
     thermbal::add_daemon_commands(app, status);
+    thermbal::add_metrics_command(app, status);
     thermbal::add_database_commands(app, status);
     thermbal::add_report_command(app, status);
     thermbal::add_probe_command(app, status);
     thermbal::add_offline_commands(app, status);
     thermbal::add_model_commands(app, status);
+    thermbal::add_manual_flags(app, {.files = "/run/thermbal/thermbald.sock: the daemon's socket\n",
+                                     .see_also = "thermbald(8), thermbal-sim(1), thermbald.toml(5)"});
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

@@ -12,6 +12,7 @@
 #include "offline_input.hpp"
 #include "output.hpp"
 #include "replay.hpp"
+#include "progress.hpp"
 #include "report/spectrum_json.hpp"
 #include "report/verdict_json.hpp"
 #include "series/sample.hpp"
@@ -66,8 +67,11 @@ int run_identify(const OfflineOptions& options) {
         if (!is_wanted(options, column.name)) unwanted.insert(column.name);
     }
     LiveFlow flow(input->flow);
+    std::optional<Progress> progress("identify");
     const auto verdict =
-        flow.identify(input->window, unwanted, parallel_on_threads(options.threads, false), not_cancelled);
+        flow.identify(input->window, unwanted,
+                      progress->counting(parallel_on_threads(options.threads, false)), not_cancelled);
+    progress.reset();
     if (!verdict) return report_error(verdict.error());
     if (options.json) {
         fmt::print("{}\n", json{{"window_end_min", verdict->window_end_min},

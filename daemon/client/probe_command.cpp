@@ -1,6 +1,6 @@
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 
 #include <fmt/format.h>
@@ -10,6 +10,8 @@
 #include "files.hpp"
 #include "output.hpp"
 #include "probe/report.hpp"
+#include "profile_files.hpp"
+#include "progress.hpp"
 
 namespace thermbal {
 namespace {
@@ -49,24 +51,6 @@ Result<void> read_units(const std::string& text, ProbeOptions& options) {
     return {};
 }
 
-/// A profile that cannot be read is no reason not to look at the module.
-std::vector<ModuleProfile> profiles_of(const ProbeFlags& flags) {
-    std::vector<ModuleProfile> profiles;
-    for (const std::string& folder : profile_folders(flags.profiles)) {
-        std::error_code error;
-        std::vector<std::string> paths;
-        for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
-             entry.increment(error)) {
-            if (entry->path().extension() == ".toml") paths.push_back(entry->path().string());
-        }
-        std::ranges::sort(paths);
-        for (const std::string& path : paths) {
-            if (auto profile = profiles_in({})(path)) profiles.push_back(std::move(*profile));
-        }
-    }
-    return profiles;
-}
-
 Result<void> write_out(const ProbeFlags& flags, const ProbeResult& result) {
     if (flags.profile_out.empty() && flags.config_out.empty()) return {};
     const auto start = starting_point(result);
@@ -99,11 +83,18 @@ int run_probe(const ProbeFlags& flags, LinkOptions link) {
     options.parities = flags.parities;
     options.last_register = flags.last_register;
     options.limit_s = flags.limit_s;
-    options.profiles = profiles_of(flags);
+    options.profiles = profiles_there(flags.profiles);
     if (const std::string complaint = check_link_options(options.link); !complaint.empty()) {
         return report_error({NextStep::refuse_input, complaint});
     }
+    std::optional<Progress> progress("probe");
+    const auto began = std::chrono::steady_clock::now();
+    progress->follow([&] {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count() /
+               options.limit_s;
+    });
     const ProbeResult result = probe(options);
+    progress.reset();
     if (flags.json && print_json(probe_json(result)) != 0) return 1;
     if (result.units.empty()) {
         return report_error(

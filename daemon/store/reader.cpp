@@ -5,9 +5,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <sys/statvfs.h>
 
+#include "rows.hpp"
 #include "schema.hpp"
 #include "sqlite.hpp"
 
@@ -166,14 +166,6 @@ IdentificationRecord identification_in(const sqlite::Statement& row) {
     return {row.text(0), row.integer(1), row.integer(2), row.text(3)};
 }
 
-std::vector<double> curve_in(const std::string& text) {
-    std::vector<double> curve;
-    const auto json = nlohmann::json::parse(text, nullptr, false);
-    if (!json.is_array()) return curve;
-    for (const auto& value : json) curve.push_back(value.is_number() ? value.get<double>() : no_value);
-    return curve;
-}
-
 bool on_read_only_medium(const std::filesystem::path& path) {
     struct statvfs medium{};
     return statvfs(path.c_str(), &medium) == 0 && (medium.f_flag & ST_RDONLY) != 0;
@@ -197,6 +189,10 @@ Result<Reader> Reader::open(const std::filesystem::path& path) {
     if (!database) return std::unexpected(database.error());
     if (auto ours = check_schema(**database, false); !ours) return std::unexpected(ours.error());
     return Reader(std::move(*database));
+}
+
+const std::filesystem::path& Reader::path() const {
+    return database_->path();
 }
 
 Result<std::vector<StoredTest>> Reader::tests() const {
@@ -314,30 +310,11 @@ Result<std::string> Reader::csv(TestId id) const {
 Result<std::vector<DeclarationRecord>> Reader::declarations(TestId id) const {
     std::vector<DeclarationRecord> declarations;
     auto rows = database_->query(
-        "SELECT c.name, d.window_end_scan, d.declared_at_min, d.n, d.C, d.sigma, d.steady_state_C, "
-        "d.steady_state_low_C, d.steady_state_high_C, d.equilibrium_time_min, d.rmse_by_n_C, d.basis, "
-        "d.version, d.withdrawn "
-        "FROM declarations d JOIN channels c ON c.test_id = d.test_id AND c.position = d.channel "
-        "WHERE d.test_id = ? ORDER BY d.channel, d.window_end_scan",
+        fmt::format("SELECT {} FROM declarations d JOIN channels c ON c.test_id = d.test_id AND c.position = "
+                    "d.channel WHERE d.test_id = ? ORDER BY d.channel, d.window_end_scan",
+                    declaration_columns),
         id);
-    while (rows.next()) {
-        DeclarationRecord declaration;
-        declaration.channel = rows.text(0);
-        declaration.window_end_scan = rows.integer(1);
-        declaration.declared_at_min = rows.real(2);
-        declaration.n = static_cast<int>(rows.integer(3));
-        declaration.C = rows.real(4);
-        declaration.sigma = rows.real(5);
-        declaration.steady_state_C = rows.real(6);
-        declaration.steady_state_low_C = rows.real(7);
-        declaration.steady_state_high_C = rows.real(8);
-        declaration.equilibrium_time_min = rows.real(9);
-        declaration.rmse_by_n_C = curve_in(rows.text(10));
-        declaration.basis_json = rows.text(11);
-        declaration.version = rows.text(12);
-        declaration.withdrawn = rows.text(13);
-        declarations.push_back(std::move(declaration));
-    }
+    while (rows.next()) declarations.push_back(declaration_in(rows));
     if (auto status = rows.status(); !status) return std::unexpected(status.error());
     return declarations;
 }
@@ -369,25 +346,12 @@ Result<std::vector<IdentificationRecord>> Reader::identifications(TestId id, std
 
 Result<std::vector<EventRecord>> Reader::events(std::optional<TestId> id, std::int64_t after_id,
                                                 std::int64_t limit) const {
-    constexpr std::string_view columns =
-        "SELECT id, test_id, wall_ns, time_s, kind, channel, message FROM events ";
-    auto rows =
-        id ? database_->query(std::string(columns) + "WHERE test_id = ? AND id > ? ORDER BY id DESC LIMIT ?",
-                              *id, after_id, limit)
-           : database_->query(std::string(columns) + "WHERE id > ? ORDER BY id DESC LIMIT ?", after_id,
-                              limit);
+    const std::string select = fmt::format("SELECT {} FROM events ", event_columns);
+    auto rows = id ? database_->query(select + "WHERE test_id = ? AND id > ? ORDER BY id DESC LIMIT ?", *id,
+                                      after_id, limit)
+                   : database_->query(select + "WHERE id > ? ORDER BY id DESC LIMIT ?", after_id, limit);
     std::vector<EventRecord> events;
-    while (rows.next()) {
-        EventRecord event;
-        event.id = rows.integer(0);
-        event.test_id = rows.optional_integer(1);
-        event.wall_ns = rows.integer(2);
-        if (!rows.null(3)) event.time_s = rows.real(3);
-        event.kind = rows.text(4);
-        if (!rows.null(5)) event.channel = rows.text(5);
-        event.message = rows.text(6);
-        events.push_back(std::move(event));
-    }
+    while (rows.next()) events.push_back(event_in(rows));
     if (auto status = rows.status(); !status) return std::unexpected(status.error());
     std::reverse(events.begin(), events.end());
     return events;

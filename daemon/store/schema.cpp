@@ -177,7 +177,91 @@ CREATE VIEW readings AS
   JOIN channels c ON c.test_id = s.test_id AND c.position = s.channel;
 )sql";
 
-constexpr std::array steps = {version_1, version_2, version_3, version_4};
+// What another program sends on (feed.hpp) and what people plot. Nothing is removed from a database, so a
+// position in it says what has been sent; what changes behind that position gets a row here: a hole that is
+// filled, readings that turn out to be stuck, a declaration that is withdrawn.
+constexpr const char* version_5 = R"sql(
+CREATE TABLE identity (database_id TEXT NOT NULL) STRICT;
+INSERT INTO identity VALUES (lower(hex(randomblob(16))));
+
+CREATE TABLE scan_revisions (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  test_id INTEGER NOT NULL,
+  scan INTEGER NOT NULL,
+  UNIQUE (test_id, scan),
+  FOREIGN KEY (test_id, scan) REFERENCES scans
+) STRICT;
+CREATE TRIGGER scan_fills_a_hole AFTER INSERT ON scans
+  WHEN EXISTS (SELECT 1 FROM scans WHERE test_id = NEW.test_id AND scan > NEW.scan) BEGIN
+  DELETE FROM scan_revisions WHERE test_id = NEW.test_id AND scan = NEW.scan;
+  INSERT INTO scan_revisions (test_id, scan) VALUES (NEW.test_id, NEW.scan);
+END;
+CREATE TRIGGER sample_revised AFTER UPDATE ON samples BEGIN
+  DELETE FROM scan_revisions WHERE test_id = NEW.test_id AND scan = NEW.scan;
+  INSERT INTO scan_revisions (test_id, scan) VALUES (NEW.test_id, NEW.scan);
+END;
+
+CREATE TABLE declaration_changes (
+  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  test_id INTEGER NOT NULL,
+  channel INTEGER NOT NULL,
+  window_end_scan INTEGER NOT NULL,
+  FOREIGN KEY (test_id, channel, window_end_scan) REFERENCES declarations
+) STRICT;
+CREATE TRIGGER declaration_made AFTER INSERT ON declarations BEGIN
+  INSERT INTO declaration_changes (test_id, channel, window_end_scan)
+  VALUES (NEW.test_id, NEW.channel, NEW.window_end_scan);
+END;
+CREATE TRIGGER declaration_withdrawn AFTER UPDATE OF withdrawn ON declarations BEGIN
+  INSERT INTO declaration_changes (test_id, channel, window_end_scan)
+  VALUES (NEW.test_id, NEW.channel, NEW.window_end_scan);
+END;
+INSERT INTO declaration_changes (test_id, channel, window_end_scan)
+  SELECT test_id, channel, window_end_scan FROM declarations ORDER BY test_id, window_end_scan, channel;
+
+CREATE VIEW test_overview AS
+  SELECT t.id AS test_id, t.name AS test, t.machine, t.state, t.stop_reason, t.period_s, t.version,
+         t.started_wall_ns / 1e9 AS started_epoch_s,
+         strftime('%Y-%m-%dT%H:%M:%fZ', t.started_wall_ns / 1e9, 'unixepoch') AS started_iso,
+         t.ended_wall_ns / 1e9 AS ended_epoch_s,
+         strftime('%Y-%m-%dT%H:%M:%fZ', t.ended_wall_ns / 1e9, 'unixepoch') AS ended_iso,
+         (SELECT max(scan) + 1 FROM scans WHERE test_id = t.id) AS scans,
+         (SELECT count(*) FROM channels WHERE test_id = t.id) AS channels,
+         (SELECT count(*) FROM declarations WHERE test_id = t.id AND withdrawn = '') AS declared_channels
+  FROM tests t;
+CREATE VIEW temperature AS
+  SELECT s.test_id, t.name AS test, t.machine, c.name AS channel, c.place, c.role, s.scan,
+         g.wall_ns / 1e9 AS time_epoch_s,
+         strftime('%Y-%m-%dT%H:%M:%fZ', g.wall_ns / 1e9, 'unixepoch') AS time_iso,
+         g.time_s, s.value_C, s.quality
+  FROM samples s JOIN scans g USING (test_id, scan)
+  JOIN channels c ON c.test_id = s.test_id AND c.position = s.channel
+  JOIN tests t ON t.id = s.test_id;
+CREATE VIEW known_input AS
+  SELECT i.test_id, t.name AS test, t.machine, i.name AS input, i.scan, g.wall_ns / 1e9 AS time_epoch_s,
+         strftime('%Y-%m-%dT%H:%M:%fZ', g.wall_ns / 1e9, 'unixepoch') AS time_iso, g.time_s, i.value
+  FROM inputs i JOIN scans g USING (test_id, scan) JOIN tests t ON t.id = i.test_id;
+CREATE VIEW declared_steady_state AS
+  SELECT d.test_id, t.name AS test, t.machine, c.name AS channel, c.place, c.role,
+         g.wall_ns / 1e9 AS time_epoch_s,
+         strftime('%Y-%m-%dT%H:%M:%fZ', g.wall_ns / 1e9, 'unixepoch') AS time_iso,
+         d.declared_at_min, d.n, d.steady_state_C, d.steady_state_low_C, d.steady_state_high_C,
+         d.equilibrium_time_min, d.withdrawn = '' AS stands, d.withdrawn
+  FROM declarations d JOIN tests t ON t.id = d.test_id
+  JOIN scans g ON g.test_id = d.test_id AND g.scan = d.window_end_scan
+  JOIN channels c ON c.test_id = d.test_id AND c.position = d.channel;
+CREATE VIEW data_quality AS
+  SELECT s.test_id, t.name AS test, t.machine, c.name AS channel, c.place, s.quality, count(*) AS samples
+  FROM samples s JOIN channels c ON c.test_id = s.test_id AND c.position = s.channel
+  JOIN tests t ON t.id = s.test_id GROUP BY s.test_id, s.channel, s.quality;
+CREATE VIEW event_log AS
+  SELECT e.id, e.test_id, t.name AS test, t.machine, e.wall_ns / 1e9 AS time_epoch_s,
+         strftime('%Y-%m-%dT%H:%M:%fZ', e.wall_ns / 1e9, 'unixepoch') AS time_iso, e.time_s, e.kind, e.channel,
+         e.message
+  FROM events e LEFT JOIN tests t ON t.id = e.test_id;
+)sql";
+
+constexpr std::array steps = {version_1, version_2, version_3, version_4, version_5};
 
 }  // namespace
 

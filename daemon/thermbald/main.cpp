@@ -15,6 +15,7 @@
 
 #include "config/load.hpp"
 #include "daemon.hpp"
+#include "manual/manual.hpp"
 #include "version.hpp"
 
 namespace {
@@ -107,6 +108,11 @@ int main(int argc, char** argv) {
         ->needs(scale);
     time.add_flag("--lockstep", flags.lockstep, "the next scan is due when the work of the last one is done")
         ->excludes(scale);
+    add_manual_flags(
+        app, {.section = 8,
+              .files = "/etc/thermbal/thermbald.toml: the configuration\n.br\n/var/lib/thermbal/thermbal.db: "
+                       "the database\n.br\n/run/thermbal/thermbald.sock: the socket\n",
+              .see_also = "thermbalctl(1), thermbald.toml(5), thermbal-mqtt(8)"});
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "backoff.hpp"
+#include "base/backoff.hpp"
 #include "modbus/frame.hpp"
 #include "modbus/profile.hpp"
 #include "wire.hpp"

@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "manual/manual.hpp"
 #include "simulator/scenario.hpp"
 #include "simulator/spindle_head.hpp"
 
@@ -325,7 +326,8 @@ Result<std::vector<ModuleUnit>> parse_units(const std::string& text, int first_i
 ParsedCommandLine parse_command_line(int argc, char** argv) {
     CLI::App app{
         "thermbal-sim: a Modbus module with 16 PT100 inputs on a spindle head that warms up.\n"
-        "It listens on loopback only, prints 'ready ...' on standard output, and ends on SIGTERM or SIGINT."};
+        "It listens on loopback only, prints 'ready ...' on standard output, and ends on SIGTERM or SIGINT.",
+        "thermbal-sim"};
     app.set_version_flag("--version", "thermbal-sim " THERMBAL_VERSION);
     app.footer("Profiles (addresses from 0):\n" + known_profiles() +
                "Faults, with times in s on the simulated clock, e.g. open:T7@3600 or exception=4:2@600-900 "
@@ -345,6 +347,7 @@ ParsedCommandLine parse_command_line(int argc, char** argv) {
     add_fault_flags(app, flags);
     add_time_flags(app, flags);
     add_offline_flags(app, flags);
+    add_manual_flags(app, {.see_also = "thermbald(8), thermbalctl(1)"});
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

@@ -19,7 +19,7 @@
 #include <termios.h>
 #include <unistd.h>
 
-#include "backoff.hpp"
+#include "base/backoff.hpp"
 #include "modbus/unit.hpp"
 #include "scripted_peer.hpp"
 #include "serial/ports.hpp"

@@ -93,6 +93,26 @@ struct StopConfig {
     double timeout_s = 10.0;
 };
 
+/// Where thermbal-mqtt sends what the database holds. A secret is never here, only the name of its file.
+struct MqttConfig {
+    enum class Backlog : std::uint8_t { newest_test, all };
+    std::string host;
+    int port = 1883;  ///< 8883 with TLS
+    bool tls = false;
+    std::string ca_file;           ///< empty with TLS: the authorities that the system trusts
+    std::string certificate_file;  ///< of this client, with key_file
+    std::string key_file;
+    std::string topic_prefix = "thermbal";
+    std::string machine;    ///< level of the topics; empty: [test] machine
+    std::string client_id;  ///< empty: made of machine and host
+    std::string username;
+    std::string password_file;
+    int keepalive_s = 30;
+    double settle_s =
+        60.0;  ///< what the broker acknowledged so recently is sent again after a lost connection
+    Backlog backlog = Backlog::newest_test;  ///< what a first start sends of a database
+};
+
 struct Config {
     TestConfig test;
     StoreConfig store;
@@ -104,6 +124,7 @@ struct Config {
     std::vector<AlarmConfig> alarms;
     IdentificationConfig identification;
     StopConfig stop;
+    std::optional<MqttConfig> mqtt;  ///< empty: nothing is sent
 
     /// Index into channels; empty when no channel has the role ambient.
     std::optional<std::size_t> ambient() const;

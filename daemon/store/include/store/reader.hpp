@@ -28,6 +28,8 @@ class Reader {
     /// Opens an existing database read only (`mode=ro`).
     static Result<Reader> open(const std::filesystem::path& path);
 
+    const std::filesystem::path& path() const;
+
     /// Newest first.
     Result<std::vector<StoredTest>> tests() const;
     Result<StoredTest> test(TestId id) const;
@@ -80,6 +82,7 @@ class Reader {
 
   private:
     friend class Store;
+    friend class Feed;
     explicit Reader(std::shared_ptr<sqlite::Database> database);
     std::shared_ptr<sqlite::Database> database_;
 };

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <random>
 
 namespace thermbal {
 
-/// How long to leave a line alone that could not be opened: doubling from `first_s` to `longest_s` with every
-/// failure, a random part of it taken off so that the lines of a plant do not come back at the same moment.
+/// How long to leave a connection alone that could not be opened: doubling from `first_s` to `longest_s` with
+/// every failure, a random part of it taken off so that the connections of a plant do not come back at the
+/// same moment.
 class Backoff {
   public:
     Backoff(double first_s, double longest_s, std::uint32_t seed)

@@ -1,0 +1,11 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace thermbal {
+
+/// A string as TOML writes it, with its quotes.
+std::string quoted(std::string_view text);
+
+}  // namespace thermbal
