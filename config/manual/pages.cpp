@@ -62,7 +62,7 @@ std::string usage_of(const CLI::App& app, const std::string& path) {
 
 /// A footer keeps its lines: tables and examples stand in it.
 std::string verbatim(const std::string& text) {
-    return text.empty() ? "" : ".PP\n.nf\n" + roff(text) + "\n.fi\n";
+    return text.empty() ? "" : ".nf\n" + roff(text) + "\n.fi\n";
 }
 
 std::string command_sections(const CLI::App& app, const std::string& path) {
@@ -72,7 +72,7 @@ std::string command_sections(const CLI::App& app, const std::string& path) {
         text +=
             ".SS " + usage_of(*command, name) + "\n" + roff(on_one_line(command->get_description())) + "\n";
         for (const OptionWords& option : visible_options(*command)) text += option_item(option);
-        text += verbatim(command->get_footer()) + command_sections(*command, name);
+        text += ".PP\n" + verbatim(command->get_footer()) + command_sections(*command, name);
     }
     return text;
 }

@@ -4,6 +4,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <thread>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -166,6 +167,7 @@ void show_event(const json& event) {
 /// Until the daemon ends with its test.
 Result<void> watch_the_test(const std::string& socket, ChildProcess& daemon) {
     auto client = connect_when_there(socket, daemon);
+    if (interrupted != 0) return trouble("interrupted");
     if (!client) return std::unexpected(client.error());
     if (auto subscribed = client->subscribe({"scan", "event"}); !subscribed) return subscribed;
     double shown_min = -15.0;
@@ -176,8 +178,9 @@ Result<void> watch_the_test(const std::string& socket, ChildProcess& daemon) {
         (*news)->topic == "scan" ? show_scan((*news)->params, shown_min) : show_event((*news)->params);
     }
     if (interrupted != 0) return trouble("interrupted");
+    // Its output has ended before it has: it still closes its database.
     for (int waited = 0; !daemon.ended() && waited < 600; ++waited)
-        std::ignore = daemon.read_line(milliseconds(100));
+        std::this_thread::sleep_for(milliseconds(100));
     if (daemon.ended() != 0)
         return trouble(fmt::format("thermbald ended with status {}", daemon.ended().value_or(-1)));
     return {};

@@ -34,7 +34,7 @@ class Shell:
             return
         if command == "thermbalctl demo" and self.made:
             return
-        done = subprocess.run(["bash", "-euo", "pipefail", "-c", command], cwd=folder, capture_output=True, text=True, timeout=200,
+        done = subprocess.run(["bash", "-euo", "pipefail", "-c", command], cwd=folder, capture_output=True, text=True, timeout=600,
                               env={**os.environ, "PATH": f"{BIN}:{os.environ['PATH']}"})
         assert done.returncode == 0, (command, done.returncode, done.stdout, done.stderr)
         assert done.stdout or done.stderr or ">" in command, (command, "says nothing")
