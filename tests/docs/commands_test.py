@@ -37,7 +37,7 @@ class Shell:
         done = subprocess.run(["bash", "-euo", "pipefail", "-c", command], cwd=folder, capture_output=True, text=True, timeout=600,
                               env={**os.environ, "PATH": f"{BIN}:{os.environ['PATH']}"})
         assert done.returncode == 0, (command, done.returncode, done.stdout, done.stderr)
-        assert done.stdout or done.stderr or ">" in command, (command, "says nothing")
+        assert done.stdout or done.stderr or re.search(r">| --(csv|out) ", command), (command, "says nothing")
         if kept:
             self.made = folder / kept.group(1)
 

@@ -42,7 +42,7 @@ def commands_of(help_text):
 
 def flags_of(help_text):
     return {flag for line in help_text.splitlines() if re.match(r"\s+-", line)
-            for flag in re.findall(r"(?<![\w-])--?[a-zA-Z][\w-]*", line[:30].split("  ")[1] if line.startswith("  ") else line)}
+            for flag in re.findall(r"(?<![\w-])--?[a-zA-Z][\w-]*", re.split(r" (?:Excludes|Needs):|  ", line.strip())[0])}
 
 
 def every_command(program, words=()):
@@ -127,10 +127,10 @@ def zsh_reads_its_completion():
         output("zsh", "-f", "-n", str(script))
         function = "_" + program.replace("-", "_")
         # _describe is stood in for: it prints the lists that it is given.
-        offered = output("zsh", "-f", "-c", f"compdef() {{ : }}; _files() {{ : }}; _describe() {{ print -l ${{(P)3}} }}; "
+        offered = output("zsh", "-f", "-c", f"compdef() {{ : }}; _files() {{ : }}; _describe() {{ print -l ${{(P)2}} }}; "
                          f"source {script}; words=({program} ''); CURRENT=2; {function}; words=({program} --); {function}")
         assert "--help:" in offered, (program, offered)
-    offered = output("zsh", "-f", "-c", f"compdef() {{ : }}; _describe() {{ print -l ${{(P)3}} }}; source "
+    offered = output("zsh", "-f", "-c", f"compdef() {{ : }}; _describe() {{ print -l ${{(P)2}} }}; source "
                      f"{BUILD}/completion/zsh/_thermbalctl; words=(thermbalctl probe ''); CURRENT=3; _thermbalctl")
     assert offered.startswith(("tcp:", "rtu:")), offered
 
