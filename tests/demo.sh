@@ -6,4 +6,6 @@ cd "$(dirname "$0")/.."
 .ci/install build demo
 cmake --preset release -DTHERMBAL_TESTS=OFF -B build/demo > /dev/null
 cmake --build build/demo --target thermbald thermbalctl thermbal-sim
-exec /usr/bin/python3 tests/demo/demo.py build/demo/bin config/profiles "$@"
+# Configuration, database, recording and report stay where the last line says.
+case " $* " in *" --keep "*) ;; *) rm -rf build/demo/test && set -- "$@" --keep build/demo/test ;; esac
+exec build/demo/bin/thermbalctl demo "$@"

@@ -127,10 +127,10 @@ def zsh_reads_its_completion():
         output("zsh", "-f", "-n", str(script))
         function = "_" + program.replace("-", "_")
         # _describe is stood in for: it prints the lists that it is given.
-        offered = output("zsh", "-f", "-c", f"compdef() {{ : }}; _files() {{ : }}; _describe() {{ print -l ${{(P)2}} }}; "
+        offered = output("zsh", "-f", "-c", f"compdef() {{ : }}; _files() {{ : }}; _describe() {{ print -l -- ${{(P)2}} }}; "
                          f"source {script}; words=({program} ''); CURRENT=2; {function}; words=({program} --); {function}")
         assert "--help:" in offered, (program, offered)
-    offered = output("zsh", "-f", "-c", f"compdef() {{ : }}; _describe() {{ print -l ${{(P)2}} }}; source "
+    offered = output("zsh", "-f", "-c", f"compdef() {{ : }}; _describe() {{ print -l -- ${{(P)2}} }}; source "
                      f"{BUILD}/completion/zsh/_thermbalctl; words=(thermbalctl probe ''); CURRENT=3; _thermbalctl")
     assert offered.startswith(("tcp:", "rtu:")), offered
 
