@@ -41,6 +41,11 @@ class Dashboard:
         answer = connection.getresponse()
         return connection, answer
 
+    def status_of(self, path="/", **headers):
+        connection, answer = self.ask(path, **headers)
+        connection.close()
+        return answer.status
+
 
 class DashboardTest(unittest.TestCase):
     @classmethod
@@ -75,7 +80,7 @@ class DashboardTest(unittest.TestCase):
                 return {names: graph.thermbal.plot.lines.map(line => line.column), rows: Array.from({length: graph.numRows()},
                     (_, row) => Array.from({length: graph.numColumns()}, (_, c) => graph.getValue(row, c)))}; })()""")
             with database(self.folder) as stored:
-                values = {(name, time_s): value for name, time_s, value in stored.execute(
+                values = {(name, round(time_s, 6)): value for name, time_s, value in stored.execute(
                     "SELECT c.name, s.time_s, v.value_C FROM samples v JOIN channels c ON c.test_id = v.test_id AND c.position = v.channel "
                     "JOIN scans s ON s.test_id = v.test_id AND s.scan = v.scan")}
             self.assertGreater(len(shown["rows"]), rows)
@@ -102,7 +107,7 @@ class DashboardTest(unittest.TestCase):
             connection.close()
             if status == 200:
                 self.assertIn("default-src 'none'", policy)
-                self.assertNotIn("unsafe-inline", policy)
+                self.assertIn("script-src 'self'; style-src 'self';", policy)
                 self.assertNotIn("http", policy)
 
     def test_readers_are_bounded_and_a_silent_one_locks_nobody_out(self):
@@ -112,7 +117,7 @@ class DashboardTest(unittest.TestCase):
         connection, answer = self.dashboard.ask("/live")
         self.assertEqual(answer.status, 503)
         connection.close()
-        self.assertEqual(self.dashboard.ask("/page.css")[1].status, 200)
+        self.assertEqual(self.dashboard.status_of("/page.css"), 200)
         for connection, _ in readers:
             connection.close()
         for one in silent:
@@ -142,14 +147,15 @@ class DashboardTest(unittest.TestCase):
         self.assertIn("everybody can read it", done.stderr)
         token.chmod(0o600)
         with Dashboard(self.socket, "--listen", "127.0.0.1:0", "--token-file", str(token)) as guarded:
-            self.assertEqual(guarded.ask("/")[1].status, 401)
-            self.assertEqual(guarded.ask("/live", cookie="thermbal_token=0123456789abcdef0124")[1].status, 401)
-            self.assertEqual(guarded.ask("/", authorization="Bearer 0123456789abcdef0123")[1].status, 200)
-            _, answer = guarded.ask("/?token=0123456789abcdef0123")
+            self.assertEqual(guarded.status_of("/"), 401)
+            self.assertEqual(guarded.status_of("/live", cookie="thermbal_token=0123456789abcdef0124"), 401)
+            self.assertEqual(guarded.status_of("/", authorization="Bearer 0123456789abcdef0123"), 200)
+            connection, answer = guarded.ask("/?token=0123456789abcdef0123")
+            connection.close()
             self.assertEqual(answer.status, 302)
             cookie = answer.getheader("Set-Cookie")
             self.assertIn("HttpOnly", cookie)
-            self.assertEqual(guarded.ask("/page.css", cookie=cookie.split(";")[0])[1].status, 200)
+            self.assertEqual(guarded.status_of("/page.css", cookie=cookie.split(";")[0]), 200)
         self.assertEqual(guarded.status, 0)
 
 

@@ -160,7 +160,8 @@ class Report(unittest.TestCase):
         values = [value for value in document["tables"]["course"]["columns"]["T5"] if value is not None]
         self.assertEqual((min(values), max(values)), (lowest, highest))
         page = self.opened(path)
-        self.assertEqual(page.run("thermbalPlots.drawn.overview ? 1 : 0"), 1)
+        page.draw_everything()
+        page.until("Object.keys(thermbalPlots.drawn).length === document.querySelectorAll('figure[data-plot]').length")
         self.assertEqual(page.troubles, [])
 
 
