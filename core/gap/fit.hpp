@@ -84,6 +84,9 @@ class FitProblem {
     /// Readings of the observed sensors at the bins; the last coordinates are the nuisances.
     Simulated simulated(const Model& model, const Eigen::VectorXd& coordinates) const;
     double nuisance_sigma(Eigen::Index nuisance) const;
+    /// Standard deviation of a flat prior: no number is less known than its bounds, no moment less than the
+    /// run.
+    double flat_sigma(const Parameter& parameter) const;
     double step_of(Eigen::Index coordinate, const FitPoint& point) const;
 
     const FitData* data_;

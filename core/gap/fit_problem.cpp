@@ -154,6 +154,12 @@ double FitProblem::nuisance_sigma(Eigen::Index nuisance) const {
     return k < data_->starts.size() ? data_->starts[k].sigma_C : data_->place_sigma;
 }
 
+double FitProblem::flat_sigma(const Parameter& parameter) const {
+    const double run_s = data_->seen.time_s.back() - data_->seen.time_s.front();
+    const double range = parameter.is_time ? run_s : parameter.upper - parameter.lower;
+    return range / std::sqrt(12.0);
+}
+
 /// Small against what the coordinate may do, large against the integrator's own error; across a bin for a
 /// moment of time, because between the samples nothing changes.
 double FitProblem::step_of(Eigen::Index coordinate, const FitPoint& point) const {
@@ -176,20 +182,26 @@ double FitProblem::step_of(Eigen::Index coordinate, const FitPoint& point) const
 }
 
 Result<Eigen::VectorXd> FitProblem::sensitivity(const FitPoint& point, Eigen::Index coordinate) const {
+    const bool number = coordinate < static_cast<Eigen::Index>(parameters_.size());
+    const Parameter* parameter = number ? &parameters_[static_cast<std::size_t>(coordinate)] : nullptr;
     double step = step_of(coordinate, point);
-    const bool time = coordinate < static_cast<Eigen::Index>(parameters_.size()) &&
-                      parameters_[static_cast<std::size_t>(coordinate)].is_time;
     Eigen::VectorXd moved = point.coordinates;
     moved(coordinate) += step;
     if (moved(coordinate) > upper()(coordinate)) moved(coordinate) -= 2.0 * step;
     step = moved(coordinate) - point.coordinates(coordinate);
     const auto ahead = evaluate(moved);
     if (!ahead) return std::unexpected(ahead.error());
-    if (!time) return Eigen::VectorXd((ahead->residual - point.residual) / step);
-    moved(coordinate) = point.coordinates(coordinate) - step;
-    const auto behind = evaluate(moved);
-    if (!behind) return std::unexpected(behind.error());
-    return Eigen::VectorXd((ahead->residual - behind->residual) / (2.0 * step));
+    Eigen::VectorXd column = (ahead->residual - point.residual) / step;
+    if (number && parameter->is_time) {
+        moved(coordinate) = point.coordinates(coordinate) - step;
+        const auto behind = evaluate(moved);
+        if (!behind) return std::unexpected(behind.error());
+        column = (ahead->residual - behind->residual) / (2.0 * step);
+    }
+    // A flat prior pulls nowhere, but it bounds how unknown the number can be.
+    if (number && std::isinf(parameter->prior_sigma))
+        column(data_->seen.reading_C.size() + coordinate) = 1.0 / flat_sigma(*parameter);
+    return column;
 }
 
 }  // namespace thermbal

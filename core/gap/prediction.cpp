@@ -44,8 +44,11 @@ Eigen::MatrixXd spread_of(const FitProblem& there, const Fit& fit, Index starts_
         const double sigma_C = there.data().starts[static_cast<std::size_t>(i)].sigma_C;
         joint(numbers + i, numbers + i) = sigma_C * sigma_C;
     }
-    joint.diagonal().array() += 1e-12;
-    return joint.llt().matrixL();
+    // Numbers of very different size: rounding may leave an eigenvalue a hair below zero.
+    const Eigen::LDLT<Eigen::MatrixXd> factors(joint);
+    const Eigen::MatrixXd lower = factors.matrixL();
+    return factors.transpositionsP().transpose() *
+           (lower * factors.vectorD().cwiseMax(0.0).cwiseSqrt().asDiagonal()).eval();
 }
 
 double gaussian_log_density(const Eigen::VectorXd& residual, const Eigen::MatrixXd& sensitivity) {

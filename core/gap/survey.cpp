@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "explanation.hpp"
@@ -82,6 +83,8 @@ Survey survey(const Evidence& evidence, const Explanation& current) {
     for (Contender& contender : result.contenders) {
         contender.log_bayes_factor = gained(contender.explanation, current);
     }
+    std::erase_if(result.contenders,
+                  [](const Contender& one) { return !std::isfinite(one.log_bayes_factor); });
     std::ranges::sort(result.contenders, std::ranges::greater{}, &Contender::log_bayes_factor);
     const FitProblem problem(evidence.run, current.fit.model);
     result.nameless = nameless_explanations(problem, current.fit, Linearisation(current.fit));
