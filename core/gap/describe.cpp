@@ -74,7 +74,7 @@ std::vector<Suspect> suspects_of(const Odds& odds, double least) {
 }
 
 Result<std::vector<FoundEffect>> describe_effects(const Evidence& evidence, const SearchResult& search,
-                                                  const DiagnoseOptions& options) {
+                                                  const Model& written, const DiagnoseOptions& options) {
     std::vector<FoundEffect> found;
     const Fit& fit = search.current.fit;
     Explanation before = search.base;
@@ -90,7 +90,7 @@ Result<std::vector<FoundEffect>> describe_effects(const Evidence& evidence, cons
         const FitProblem problem(evidence.run, fit.model);
         const Odds& odds = search.steps[k].odds;
         FoundEffect one;
-        one.effect = fit.model.effects[evidence.prior_model.effects.size() + k];
+        one.effect = written.effects[evidence.prior_model.effects.size() + k];
         one.at = place_of(one.effect, fit.model);
         one.channels = channels_changed(problem, after.fit, before.fit);
         std::tie(one.from_s, one.to_s) = window_of(one.effect, evidence.run.seen);

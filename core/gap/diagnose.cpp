@@ -77,10 +77,26 @@ Result<void> compare_runs(const Evidence& evidence, const RecordedTest& test,
     return {};
 }
 
-Model extended_model(const Model& calibrated, const std::vector<FoundEffect>& effects,
-                     const SearchResult& search) {
-    Model model = search.steps.empty() ? calibrated : search.current.fit.model;
-    model.effects.resize(calibrated.effects.size());
+/// The models that a file can hold: a sensor has no place of its own in its node there, so that the model's
+/// own numbers have to describe what that place did in the search.
+struct WrittenModels {
+    Model calibrated, extended;
+};
+
+Result<WrittenModels> as_written(const Evidence& evidence, const SearchResult& search) {
+    Evidence without_places = evidence;
+    without_places.run.place_sigma = 1e-6;
+    auto calibrated = polish(without_places, search.base);
+    if (!calibrated) return std::unexpected(calibrated.error());
+    if (search.steps.empty()) return WrittenModels{calibrated->fit.model, calibrated->fit.model};
+    auto extended = polish(without_places, search.current);
+    if (!extended) return std::unexpected(extended.error());
+    return WrittenModels{std::move(calibrated->fit.model), std::move(extended->fit.model)};
+}
+
+/// With the effects as they were described: provenance, how well each number is known.
+Model extended_model(Model model, const std::vector<FoundEffect>& effects, std::size_t known) {
+    model.effects.resize(known);
     for (const FoundEffect& found : effects) model.effects.push_back(found.effect);
     return model;
 }
@@ -112,14 +128,16 @@ Result<Diagnosis> diagnose(const Model& model, const RecordedTest& test, std::sp
     const auto search = search_effects(*evidence, std::move(*calibrated), options);
     if (!search) return std::unexpected(search.error());
 
-    auto effects = describe_effects(*evidence, *search, options);
+    auto written = as_written(*evidence, *search);
+    if (!written) return std::unexpected(written.error());
+    auto effects = describe_effects(*evidence, *search, written->extended, options);
     if (!effects) return std::unexpected(effects.error());
 
     Diagnosis diagnosis;
     diagnosis.verdict = verdict_of(*search);
     diagnosis.effects = std::move(*effects);
-    diagnosis.calibrated = search->base.fit.model;
-    diagnosis.extended = extended_model(diagnosis.calibrated, diagnosis.effects, *search);
+    diagnosis.calibrated = std::move(written->calibrated);
+    diagnosis.extended = extended_model(written->extended, diagnosis.effects, model.effects.size());
     diagnosis.suspects = suspects_of(search->left, options.probability_to_list);
     diagnosis.reason = reason_of(*search, diagnosis);
     diagnosis.share_of_rise = options.calibration.fidelity.share_of_rise;
