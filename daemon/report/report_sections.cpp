@@ -284,7 +284,7 @@ std::string sensor_map(const TestReport& report) {
             degrees(end_C(report, *channel), 1),
             channel->is_ambient
                 ? std::string("the room")
-                : fmt::format("{:+.1f} &deg;C {}", rise, is_declared(*channel) ? "when settled" : "so far"));
+                : fmt::format("{:+.1f} &deg;C {}", rise, is_declared(*channel) ? "in all" : "so far"));
     }
     return html + "</div>";
 }

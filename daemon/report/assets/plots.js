@@ -214,7 +214,7 @@ const thermbalPlots = (() => {
     const old = drawn[figure.dataset.plot];
     if (old && old.thermbal.plot.lines.length === plot.lines.length) {
       Object.assign(old.thermbal, {plot, table});
-      old.updateOptions(Object.assign({file: rows}, old.isZoomed() ? {} : {valueRange: plot.range}));
+      old.updateOptions(Object.assign({file: rows}, old.isZoomed('x') ? {} : {valueRange: plot.range}));
       return old;
     }
     if (old) old.destroy();
