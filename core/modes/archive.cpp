@@ -145,7 +145,7 @@ Result<SpectrumPrior> learn_prior(const std::vector<ArchivedSpectrum>& tests, co
 Contradiction contradiction_of(const SpectrumEstimate& with_archive, double allowed_mode_energy) {
     Contradiction result;
     result.mode_energy = with_archive.mode_energy;
-    result.contradicted = with_archive.used_responses && with_archive.mode_energy > allowed_mode_energy;
+    result.contradicted = with_archive.used_responses() && with_archive.mode_energy > allowed_mode_energy;
     if (!result.contradicted) return result;
     result.reason = fmt::format(
         "earlier tests of this machine do not fit this one (what they leave over is {:.2f}, {:.2f} is "

@@ -106,6 +106,10 @@ ChannelEstimate channel_estimate(const SpectrumProblem& problem, const ObservedC
 
 }  // namespace
 
+bool SpectrumEstimate::used_responses() const {
+    return std::ranges::any_of(channels, &ChannelEstimate::used_responses);
+}
+
 Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::string_view ambient,
                                            const std::optional<SpectrumPrior>& prior,
                                            const SpectrumOptions& options, std::uint64_t seed,
@@ -129,8 +133,6 @@ Result<SpectrumEstimate> estimate_spectrum(const TestWindow& recorded, std::stri
     estimate.mode_log_variance.assign(draws.log_variance.begin(), draws.log_variance.end());
     estimate.expected_modes = draws.density.sum();
     estimate.mode_energy = sorted_quantile(draws.mode_energy, 0.5);
-    estimate.used_responses = std::ranges::any_of(
-        problem.channels, [](const auto& channel) { return channel.responses.cols() > 0; });
     estimate.window_start_s = problem.window.start_s;
     estimate.window_end_s = problem.window.end_s();
     estimate.ambient_reference_C = problem.room.reference_C;

@@ -122,10 +122,13 @@ int run_replay(const OfflineOptions& options) {
     const auto word = [](const ReplayChange& one) {
         return one.change.kind == DeclarationChange::Kind::declared ? "declared" : "withdrawn";
     };
-    const auto done = replay(*input, options, [&](const ReplayChange& one) {
+    std::optional<Progress> progress("replay");
+    const auto tell = [&](const ReplayChange& one) {
         if (options.json) return;
         fmt::print("{:7.2f} min  {} {}: {}\n", one.at_min, one.change.channel, word(one), one.change.reason);
-    });
+    };
+    const auto done = replay(*input, options, tell, *progress);
+    progress.reset();
     if (!done) return report_error(done.error());
     if (options.json) {
         json changes = json::array();

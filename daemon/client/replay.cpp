@@ -1,6 +1,7 @@
 #include "replay.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include <fmt/format.h>
@@ -33,7 +34,7 @@ void sweep_the_others(Replay& done, const OfflineInput& input, const Declaration
 }  // namespace
 
 Result<Replay> replay(const OfflineInput& input, const OfflineOptions& options,
-                      const std::function<void(const ReplayChange&)>& tell) {
+                      const std::function<void(const ReplayChange&)>& tell, Progress& progress) {
     const ParallelFor parallel_for = parallel_on_threads(options.threads, false);
     LiveFlow flow(input.flow);
     Declarations declarations;
@@ -42,6 +43,8 @@ Result<Replay> replay(const OfflineInput& input, const OfflineOptions& options,
     const double first_min = input.window.start_s / 60.0;
     for (double until_min = first_min + options.every_min; until_min <= end_min + 1e-9;
          until_min += options.every_min) {
+        // The work of a window grows with its length, so all windows up to here go with its square.
+        progress.set(std::pow((until_min - first_min) / (end_min - first_min), 2.0));
         const TestWindow window = window_until(input.window, until_min * 60.0);
         const auto verdict =
             flow.identify(window, declarations.declared_channels(), parallel_for, not_cancelled);

@@ -7,6 +7,7 @@
 #include "declaration/declarations.hpp"
 #include "declaration/stop_rule.hpp"
 #include "offline_input.hpp"
+#include "progress.hpp"
 #include "series/sample.hpp"
 
 namespace thermbal {
@@ -26,9 +27,9 @@ struct Replay {
 };
 
 /// The growing window: identification again every options.every_min, until the stop rule holds or the
-/// recording ends. `tell` hears every change as it is made. Errors (refuse_input): the recording cannot be
-/// identified at all.
+/// recording ends. `tell` hears every change as it is made, `progress` how far it is. Errors (refuse_input):
+/// the recording cannot be identified at all.
 Result<Replay> replay(const OfflineInput& input, const OfflineOptions& options,
-                      const std::function<void(const ReplayChange&)>& tell);
+                      const std::function<void(const ReplayChange&)>& tell, Progress& progress);
 
 }  // namespace thermbal

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <optional>
 
 #include <fmt/format.h>
 
 #include "compute/threads.hpp"
 #include "files.hpp"
 #include "output.hpp"
+#include "progress.hpp"
 #include "replay.hpp"
 #include "report/assets.hpp"
 #include "report_courses.hpp"
@@ -76,7 +78,9 @@ Result<TestReport> wanted_report(const ReportOptions& options) {
 Result<TestReport> report_of_recording(const ReportOptions& options) {
     auto input = read_input(options.recording);
     if (!input) return std::unexpected(input.error());
-    const auto done = replay(*input, options.recording, [](const ReplayChange&) {});
+    std::optional<Progress> progress("report");
+    const auto done = replay(*input, options.recording, [](const ReplayChange&) {}, *progress);
+    progress.reset();
     if (!done) return std::unexpected(done.error());
     TestReport report{.name = "",
                       .machine = options.recording.machine,

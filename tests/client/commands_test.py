@@ -3,11 +3,10 @@ import json
 import os
 import sqlite3
 import subprocess
-import tempfile
 import time
 import unittest
 
-from fake_daemon import FakeDaemon
+from fake_daemon import DaemonCase
 
 PROGRAM = os.path.join(os.environ["THERMBAL_BIN_DIR"], "thermbalctl")
 ENVIRONMENT = {**os.environ, "LC_ALL": "C.UTF-8", "TZ": "UTC"}
@@ -19,14 +18,7 @@ def run(*arguments, environment=None):
                           env=environment or ENVIRONMENT)
 
 
-class Commands(unittest.TestCase):
-    def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.addCleanup(self.folder.cleanup)
-        self.socket = os.path.join(self.folder.name, "thermbald.sock")
-        self.daemon = FakeDaemon(self.socket)
-        self.addCleanup(self.daemon.close)
-
+class Commands(DaemonCase):
     def ask(self, *arguments, status=0):
         made = run(*arguments, "--socket", self.socket)
         self.assertEqual(made.returncode, status, made.stderr)

@@ -6,7 +6,9 @@ import json
 import math
 import os
 import socket
+import tempfile
 import threading
+import unittest
 
 PLACES = ["room, 1.5 m above the floor", "spindle motor", "front bearing", "rear bearing", "sleeve", "headstock left",
           "headstock right", "headstock top", "column, upper", "column, lower", "bed, front", "bed, rear",
@@ -210,3 +212,14 @@ class FakeDaemon:
                         self.subscribed.append(connection)
         except OSError:
             pass
+
+
+class DaemonCase(unittest.TestCase):
+    """A test with a fake daemon of its own: self.daemon, on self.socket, in self.folder."""
+
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.socket = os.path.join(self.folder.name, "thermbald.sock")
+        self.daemon = FakeDaemon(self.socket)
+        self.addCleanup(lambda: self.daemon.close())  # whichever it is by then

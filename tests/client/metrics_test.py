@@ -4,12 +4,11 @@ import pathlib
 import shutil
 import socket
 import subprocess
-import tempfile
 import time
 import unittest
 import urllib.request
 
-from fake_daemon import FakeDaemon
+from fake_daemon import DaemonCase
 
 PROGRAM = os.path.join(os.environ["THERMBAL_BIN_DIR"], "thermbalctl")
 
@@ -23,14 +22,7 @@ def samples(text):
     return {line.rsplit(" ", 1)[0]: float(line.rsplit(" ", 1)[1]) for line in text.splitlines() if not line.startswith("#")}
 
 
-class Metrics(unittest.TestCase):
-    def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.addCleanup(self.folder.cleanup)
-        self.socket = os.path.join(self.folder.name, "thermbald.sock")
-        self.daemon = FakeDaemon(self.socket)
-        self.addCleanup(self.daemon.close)
-
+class Metrics(DaemonCase):
     def text(self):
         made = run("metrics", "--socket", self.socket)
         self.assertEqual((made.returncode, made.stderr), (0, ""))

@@ -5,28 +5,16 @@ import re
 import shutil
 import signal
 import subprocess
-import tempfile
 import time
 import unittest
 
-from fake_daemon import FakeDaemon
+from fake_daemon import DaemonCase, FakeDaemon
 
 PROGRAM = os.path.join(os.environ["THERMBAL_BIN_DIR"], "thermbalctl")
 ENVIRONMENT = {**os.environ, "LC_ALL": "C.UTF-8", "TERM": "xterm-256color"}
 
 
-class Watch(unittest.TestCase):
-    def setUp(self):
-        self.folder = tempfile.TemporaryDirectory()
-        self.addCleanup(self.folder.cleanup)
-        self.socket = os.path.join(self.folder.name, "d.sock")
-        self.daemon = FakeDaemon(self.socket)
-
-    def tearDown(self):
-        self.daemon.close()
-
-
-class Piped(Watch):
+class Piped(DaemonCase):
     def start(self, *arguments):
         made = subprocess.Popen([PROGRAM, "watch", "--socket", self.socket, *arguments], stdout=subprocess.PIPE,
                                 stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
@@ -73,7 +61,7 @@ class Piped(Watch):
         self.assertEqual(made.wait(10), 0)
 
 
-class Screen(Watch):
+class Screen(DaemonCase):
     def setUp(self):
         super().setUp()
         self.tmux_socket = os.path.join(self.folder.name, "tmux")

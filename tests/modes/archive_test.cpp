@@ -65,7 +65,7 @@ TEST(Archive, AnotherMachineIsNoticedAndItsPriorDropped) {
     ASSERT_TRUE(estimate.has_value());
     EXPECT_TRUE(estimate->contradiction.contradicted) << estimate->contradiction.mode_energy;
     EXPECT_THAT(estimate->contradiction.reason, ::testing::HasSubstr("archive is not used"));
-    EXPECT_FALSE(estimate->estimate.used_responses);
+    EXPECT_FALSE(estimate->estimate.used_responses());
 }
 
 TEST(Archive, RefusesSpectraOfAnotherGrid) {

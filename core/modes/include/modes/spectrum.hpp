@@ -134,7 +134,9 @@ struct SpectrumEstimate {
     /// they carry. Under an archive's responses, far above its prior's if these cannot be bent to the
     /// samples.
     double mode_energy = 0.0;
-    bool used_responses = false;  ///< archived responses took part
+
+    /// Archived responses took part on some channel.
+    bool used_responses() const;
 };
 
 /// Estimates where every structural channel of `window` settles from time constants that all of them share.
