@@ -117,7 +117,24 @@ std::string quality_strip(const TestReport& report) {
     return svg + "</svg>";
 }
 
-std::string quality_row(const ReportChannel& channel) {
+/// Of the table of qualities: a recording has neither, a daemon's test may have no calibration.
+struct QualityColumns {
+    bool read_at = false;
+    bool calibration = false;
+};
+
+std::string quality_head(const QualityColumns& columns) {
+    return fmt::format(
+        R"(<tr><th></th>{}<th class="number">samples</th><th class="number">good</th><th>not good</th>{}</tr>)",
+        columns.read_at ? R"(<th class="wide">read at</th>)" : "",
+        columns.calibration ? R"(<th class="wide">calibration</th>)" : "");
+}
+
+std::string wide_cell(bool shown, std::string_view text) {
+    return shown ? fmt::format(R"(<td class="wide">{}</td>)", escaped(text)) : std::string();
+}
+
+std::string quality_row(const ReportChannel& channel, const QualityColumns& columns) {
     std::size_t good = 0;
     std::string others;
     for (const auto& [quality, count] : quality_counts(channel)) {
@@ -131,9 +148,10 @@ std::string quality_row(const ReportChannel& channel) {
                                                  : 100.0 * static_cast<double>(good) /
                                                        static_cast<double>(channel.quality.size());
     return fmt::format(
-        R"(<tr><td><b>{}</b></td><td class="wide">{}</td><td class="number">{}</td><td class="number">{:.1f} %</td><td class="{}">{}</td><td class="wide">{}</td></tr>)",
-        escaped(channel.name), escaped(channel.source), channel.quality.size(), share,
-        others.empty() ? "quiet" : "warn", others.empty() ? "none" : others, escaped(channel.calibration));
+        R"(<tr><td><b>{}</b></td>{}<td class="number">{}</td><td class="number">{:.1f} %</td><td class="{}">{}</td>{}</tr>)",
+        escaped(channel.name), wide_cell(columns.read_at, channel.source), channel.quality.size(), share,
+        others.empty() ? "quiet" : "warn", others.empty() ? "none" : others,
+        wide_cell(columns.calibration, channel.calibration));
 }
 
 Plot warm_up_plot(const TestReport& report, const ReportChannel& channel, double unit_s) {
@@ -324,9 +342,14 @@ std::string quality_section(const TestReport& report) {
         "{} scans, one each {:.6g} s{}. A reading that did not come from the sensor is marked and never "
         "used as a number.</p><div class=\"card\">{}</div>",
         scans, report.window.period_s, how.empty() ? "" : ": " + how, quality_strip(report));
-    html +=
-        R"(<div class="scroll"><table><thead><tr><th></th><th class="wide">read at</th><th class="number">samples</th><th class="number">good</th><th>not good</th><th class="wide">calibration</th></tr></thead><tbody>)";
-    for (const ReportChannel& channel : report.channels) html += quality_row(channel);
+    const auto says = [&](const std::string ReportChannel::* text) {
+        return std::ranges::any_of(report.channels,
+                                   [text](const ReportChannel& channel) { return !(channel.*text).empty(); });
+    };
+    const QualityColumns columns{.read_at = says(&ReportChannel::source),
+                                 .calibration = says(&ReportChannel::calibration)};
+    html += fmt::format(R"(<div class="scroll"><table><thead>{}</thead><tbody>)", quality_head(columns));
+    for (const ReportChannel& channel : report.channels) html += quality_row(channel, columns);
     return html + "</tbody></table></div>";
 }
 

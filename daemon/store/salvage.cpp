@@ -1,6 +1,7 @@
 #include "salvage.hpp"
 
 #include <cmath>
+#include <ranges>
 #include <utility>
 #include <vector>
 
@@ -79,8 +80,7 @@ Result<void> copy_events(const Reader& damaged, Store& fresh, TestId id) {
 Result<void> copy_archive(const Reader& damaged, Store& fresh) {
     const auto archive = damaged.archive("");
     if (!archive) return {};
-    for (auto record = archive->rbegin(); record != archive->rend(); ++record) {
-        ArchiveRecord alone = *record;
+    for (ArchiveRecord alone : std::views::reverse(*archive)) {
         alone.test_id.reset();
         if (auto stored = fresh.record_archive(alone); !stored) return std::unexpected(stored.error());
     }

@@ -73,6 +73,7 @@ std::size_t StoreQueue::scans_at_front(std::size_t most) const {
 Result<void> StoreQueue::write_front(std::size_t scans) {
     if (scans == 0) return waiting_.front().write(store_);
     std::vector<ScanRecord> records;
+    records.reserve(scans);
     for (std::size_t i = 0; i < scans; ++i) records.push_back(*waiting_[i].scan);
     return store_.append_scans(waiting_.front().test, records);
 }

@@ -40,6 +40,7 @@ void Daemon::take_scan(Scan& scan) {
     progress_.store_answered(real_monotonic_ns());
     if (storage_.damaged()) leave_damaged_database();
     tell_storage_news();
+    log_health_hourly();
     if (server_.counters().subscribers > 0) server_.publish("scan", channels_json().value_or(nullptr));
     if (!is_measuring(test_.state) || !identifying) settle(scan.scan);
 }

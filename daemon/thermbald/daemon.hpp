@@ -135,6 +135,8 @@ class Daemon {
     Result<nlohmann::json> predictions_json() const;
     Result<nlohmann::json> events_json(const nlohmann::json& params) const;
     Result<nlohmann::json> health_json() const;
+    void log_health();
+    void log_health_hourly();
     Result<nlohmann::json> on_start(const nlohmann::json& params);
     Result<nlohmann::json> on_stop(const nlohmann::json& params);
     Result<nlohmann::json> on_annotate(const nlohmann::json& params);
@@ -166,6 +168,7 @@ class Daemon {
     RecentFigures lateness_ms_, commit_ms_, identification_s_;
     std::uint64_t scans_ok_ = 0, scans_late_ = 0, scans_missed_ = 0;
     std::int64_t started_ns_ = 0;
+    std::int64_t health_logged_ns_ = 0;
     Progress progress_;
 
     sd_event* loop_ = nullptr;

@@ -1,9 +1,11 @@
 #include <utility>
 
 #include <nlohmann/json.hpp>
+#include <spdlog/spdlog.h>
 #include <sys/resource.h>
 
 #include "daemon.hpp"
+#include "health_log.hpp"
 
 namespace thermbal {
 namespace {
@@ -88,6 +90,18 @@ Result<json> Daemon::health_json() const {
                 {"max_rss_bytes", usage.ru_maxrss * 1024},
                 {"clients", counters.clients},
                 {"lines", std::move(lines)}};
+}
+
+void Daemon::log_health() {
+    health_logged_ns_ = clock_.monotonic_ns();
+    const auto health = health_json();
+    if (!health) return;
+    for (const std::string& line : health_log(*health)) spdlog::info("{}", line);
+}
+
+void Daemon::log_health_hourly() {
+    constexpr std::int64_t hour_ns = 3'600'000'000'000;
+    if (clock_.monotonic_ns() - health_logged_ns_ >= hour_ns) log_health();
 }
 
 }  // namespace thermbal

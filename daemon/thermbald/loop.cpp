@@ -67,6 +67,7 @@ Daemon::Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer se
       hooks_(std::move(hooks)),
       freeze_watch_(watched_modules(options_.config)),
       started_ns_(clock.monotonic_ns()),
+      health_logged_ns_(started_ns_),
       progress_(line_names(options_.config), longest_standstill_ns(options_.config), real_monotonic_ns()) {
     newest_good_C_.assign(options_.config.channels.size(), no_value);
     for (std::size_t i = 0; i < options_.config.lines.size(); ++i) {
@@ -202,6 +203,7 @@ Result<void> Daemon::run() {
     check_database();
     const auto ended = check(sd_event_loop(loop_), "event loop");
     leave_nothing_unstored();
+    log_health();
     notify_stopping(is_measuring(test_.state) ? "the running test goes on at the next start" : "");
     return ended;
 }

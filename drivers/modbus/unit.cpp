@@ -12,10 +12,12 @@ namespace {
 
 void decode_block(const ModuleProfile& profile, const BlockRead& block,
                   std::span<const std::uint16_t> registers, std::vector<Sample>& samples) {
-    for (int i = 0; i < block.inputs; ++i) {
-        const auto input = static_cast<std::size_t>(i);
-        const std::size_t at = std::min(registers.size(), input * static_cast<std::size_t>(profile.stride));
-        samples[static_cast<std::size_t>(block.first_input + i)] = decode(profile, registers.subspan(at));
+    const auto inputs = static_cast<std::size_t>(block.inputs);
+    const auto first_input = static_cast<std::size_t>(block.first_input);
+    const auto stride = static_cast<std::size_t>(profile.stride);
+    for (std::size_t input = 0; input < inputs; ++input) {
+        const std::size_t at = std::min(registers.size(), input * stride);
+        samples[first_input + input] = decode(profile, registers.subspan(at));
     }
 }
 
@@ -83,12 +85,13 @@ ModuleProfile type_code_map(const ModuleProfile& profile) {
 
 Result<std::vector<std::uint16_t>> read_type_codes(Link& link, int unit_id, const ModuleProfile& profile) {
     const ModuleProfile map = type_code_map(profile);
+    const auto stride = static_cast<std::size_t>(map.stride);
     std::vector<std::uint16_t> codes;
     for (const BlockRead& block : plan_blocks(map)) {
         const auto words = link.read_block(unit_id, map.function, block.first, block.count);
         if (!words) return std::unexpected(words.error());
-        for (int input = 0; input < block.inputs; ++input)
-            codes.push_back((*words)[static_cast<std::size_t>(input * map.stride)]);
+        const auto inputs = static_cast<std::size_t>(block.inputs);
+        for (std::size_t input = 0; input < inputs; ++input) codes.push_back((*words)[input * stride]);
     }
     codes.resize(static_cast<std::size_t>(profile.inputs), codes.back());
     return codes;

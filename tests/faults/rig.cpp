@@ -13,6 +13,8 @@
 namespace thermbal::soak {
 namespace {
 
+constexpr int look_every_ms = 1;
+
 std::uint64_t mixed(std::uint64_t x) {  // splitmix64
     x += 0x9E3779B97F4A7C15U;
     x = (x ^ (x >> 30U)) * 0xBF58476D1CE4E5B9U;
@@ -49,6 +51,7 @@ Rig::Rig(Transport transport, Layout layout, std::uint64_t seed)
     : transport_(transport),
       layout_(layout),
       seed_(seed),
+      looked_ns_(monotonic_ns()),
       station_(ModbusModule(*find_register_map("int16"), units_of(layout)),
                {.read_C = [this](double) { return measured_C(); }}, FaultPlan(), SimClock::scaled(1.0, 0),
                ForeignUnit::silence, {}, seed),
@@ -57,7 +60,7 @@ Rig::Rig(Transport transport, Layout layout, std::uint64_t seed)
           std::make_unique<Server>([this](Framing framing, const ModbusRequest& request,
                                           std::int64_t now_ns) { return answer(framing, request, now_ns); })),
       stop_(eventfd(0, EFD_CLOEXEC)) {
-    server_->watch_endpoint([this](std::int64_t now_ns) { return look(now_ns); }, 1);
+    server_->watch_endpoint([this](std::int64_t now_ns) { return look(now_ns); }, look_every_ms);
     if (transport == Transport::tcp) {
         TcpEndpoint endpoint = checked(listen_on_loopback(0));
         port_ = endpoint.port;
@@ -115,6 +118,7 @@ void Rig::end_faults() {
 EndpointState Rig::look(std::int64_t now_ns) {
     // A request that lay in the kernel while nobody looked is answered at the look after the next one.
     constexpr std::int64_t soon_ns = 4'000'000;
+    worst_pause_ns_ = std::max(worst_pause_ns_.load(), now_ns - looked_ns_.exchange(now_ns));
     const std::lock_guard lock(mutex_);
     const EndpointState now = station_.endpoint(now_ns);
     const bool planned = !station_.plan().faults().empty();
@@ -124,6 +128,11 @@ EndpointState Rig::look(std::int64_t now_ns) {
     }
     seen_ = now;
     return now;
+}
+
+double Rig::worst_stall_s() const {
+    const std::int64_t pause_ns = std::max(worst_pause_ns_.load(), monotonic_ns() - looked_ns_);
+    return static_cast<double>(pause_ns - look_every_ms * 1'000'000) * 1e-9;
 }
 
 std::vector<Delivery> Rig::answer(Framing framing, const ModbusRequest& request, std::int64_t now_ns) {

@@ -53,6 +53,11 @@ class Rig {
     /// held back has gone out.
     bool quiet() const { return monotonic_ns() > disturbed_until_ns_; }
 
+    /// How long at most the host kept the module's thread, which wakes every millisecond, from running since
+    /// reset_stall(); one that is not over yet included.
+    double worst_stall_s() const;
+    void reset_stall() { worst_pause_ns_ = 0; }
+
   private:
     void serve(int stop_fd);
     EndpointState look(std::int64_t now_ns);
@@ -65,6 +70,8 @@ class Rig {
     std::atomic<std::int64_t> scan_ = 0;
     std::atomic<std::uint64_t> faults_begun_ = 0;
     std::atomic<std::int64_t> disturbed_until_ns_ = 0;
+    std::atomic<std::int64_t> looked_ns_;
+    std::atomic<std::int64_t> worst_pause_ns_ = 0;  ///< between two looks
     mutable std::mutex mutex_;
     Station station_;                   // guarded by mutex_
     std::mt19937_64 turnaround_;        // server thread

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <thread>
-#include <utility>
 
 #include "acquisition/clock.hpp"
 
@@ -39,7 +38,10 @@ std::vector<ChannelSample> SoakedLine::read_scan() {
     const std::uint64_t faults_before = rig_.faults_begun();
     const bool quiet = rig_.quiet();
     facts_ = {};
+    // What was held back during the scan before, or behind it, may come during this one.
+    const double stalled_before_s = host_stalled_s();
     stalls_.reset();
+    rig_.reset_stall();
     const std::int64_t started_ns = real_monotonic_ns();
     std::vector<ChannelSample> samples;
     for (const UnitPlan& plan : plans_) {
@@ -48,9 +50,7 @@ std::vector<ChannelSample> SoakedLine::read_scan() {
         for (const Sample& sample : reading.samples) samples.push_back({samples.size(), sample});
     }
     facts_.took_s = static_cast<double>(real_monotonic_ns() - started_ns) * 1e-9;
-    // What a stall held back may come during the scan after it.
-    const double stalled_s = stalls_.worst_s();
-    facts_.host_stalled_s = std::max(stalled_s, std::exchange(stalled_before_s_, stalled_s));
+    facts_.host_stalled_s = std::max(host_stalled_s(), stalled_before_s);
     facts_.clean = quiet && rig_.faults_begun() == faults_before;
     return samples;
 }

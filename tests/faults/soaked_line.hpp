@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -15,7 +16,7 @@ namespace thermbal::soak {
 struct ScanFacts {
     bool clean = false;           ///< it began after the fault had ended, and ended before the next one began
     double took_s = 0.0;          ///< real time
-    double host_stalled_s = 0.0;  ///< by StallMeter, in this scan or the one before
+    double host_stalled_s = 0.0;  ///< by StallMeter and Rig, from the scan before on
     std::string error;            ///< of the first unit that failed
 };
 
@@ -30,7 +31,7 @@ class SoakedLine final : public Line {
     /// Of the last scan; between its mail and the settling of its clock nobody else touches it.
     const ScanFacts& facts() const { return facts_; }
     /// Since the last scan began. Any thread.
-    double host_stalled_s() const { return stalls_.worst_s(); }
+    double host_stalled_s() const { return std::max(stalls_.worst_s(), rig_.worst_stall_s()); }
     /// No scan takes longer, whatever the module does: the shortest period that a configuration may ask for.
     double bound_s() const { return bound_s_; }
 
@@ -42,7 +43,6 @@ class SoakedLine final : public Line {
     double bound_s_ = 0.0;
     std::int64_t scan_ = 0;
     StallMeter stalls_;
-    double stalled_before_s_ = 0.0;
     ScanFacts facts_;
 };
 

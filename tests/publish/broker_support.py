@@ -41,16 +41,18 @@ def free_port():
 
 
 class Broker:
-    """mosquitto that keeps its messages over a kill, as far as it can: `extra` are further lines of its configuration."""
+    """mosquitto that keeps its messages over a kill, as far as it can: written at every change, or with many machines each
+    second, as a plant's broker would. `extra` are further lines of its configuration."""
 
-    def __init__(self, folder, extra=""):
+    def __init__(self, folder, extra="", written="at every change"):
         self.folder = pathlib.Path(folder)
         self.port = free_port()
         self.config = self.folder / "mosquitto.conf"
         user = "user root\n" if os.geteuid() == 0 else ""
         self.config.write_text(
             f"listener {self.port} 127.0.0.1\n{user}persistence true\npersistence_location {self.folder}/\n"
-            f"autosave_interval 1\nautosave_on_changes true\nmax_queued_messages 0\n"
+            f"autosave_interval 1\nautosave_on_changes {'true' if written == 'at every change' else 'false'}\n"
+            f"max_queued_messages 0\n"
             f"{extra or 'allow_anonymous true'}\n", encoding="utf-8")
         self.process = None
         self.start()

@@ -14,7 +14,7 @@ UNITS = pathlib.Path(os.environ["THERMBAL_BIN_DIR"]).parent / "systemd" / "units
 VARIANTS = pathlib.Path(os.environ["THERMBAL_SOURCE_DIR"]) / "systemd"
 # unit, drop-in, the most that is allowed
 BOUNDS = [("thermbald", None, 1.5), ("thermbald@", None, 1.5), ("thermbald", "tcp-only", 1.5),
-          ("thermbald", "serial-only", 0.8), ("thermbald@", "serial-only", 0.8)]
+          ("thermbald", "serial-only", 0.8), ("thermbald@", "serial-only", 0.8), ("thermbal-mqtt", None, 1.5)]
 OTHERS_AT_MOST = 1.5
 
 

@@ -142,6 +142,16 @@ def sandbox_refuses(box):
         + ", ".join(f"{what}: {found[what]}" for what in DEPENDS_ON_THE_KERNEL))
 
 
+def publishes_in_the_sandbox(box):
+    box.run("apt-get install -y -qq --no-install-recommends mosquitto mosquitto-clients && systemctl start mosquitto", seconds=600)
+    # No comment of the installed configuration is touched: the section is added.
+    box.run(f"printf '\\n[mqtt]\\nhost = \"127.0.0.1\"\\nport = 1883\\n' >> {CONFIG} && systemctl start thermbal-mqtt")
+    heard = json.loads(box.run("mosquitto_sub -t 'thermbal/+/samples' -C 1 -W 60"))
+    assert heard["samples"]["T1"]["quality"] == "good", heard
+    assert box.run("systemctl is-active thermbal-mqtt").strip() == "active"
+    say(f"ok   thermbal-mqtt in the same sandbox sends to a broker: scan {heard['scan']} came")
+
+
 def runs_an_instance(box):
     write_config(box, "/etc/thermbal/line2.toml", {"/var/lib/thermbal/": "/var/lib/thermbal/line2/",
                                                    "/run/thermbal/": "/run/thermbal/line2/"})
@@ -210,8 +220,8 @@ def main():
     packages = pathlib.Path(sys.argv[1]).resolve()
     with Container(clean_root(), {packages: "/packages"}) as box:
         try:
-            for step in (installs, measures_in_the_sandbox, sandbox_refuses, survives_the_death_of_the_daemon,
-                         runs_an_instance, upgrades_during_a_test, measures_serial_without_network, goes_away):
+            for step in (installs, measures_in_the_sandbox, sandbox_refuses, publishes_in_the_sandbox,
+                         survives_the_death_of_the_daemon, runs_an_instance, upgrades_during_a_test, measures_serial_without_network, goes_away):
                 step(box)
         except BaseException:
             say(box.attempt("systemctl --no-pager --failed; journalctl -n 60 --no-pager").stdout[-6000:])

@@ -75,5 +75,19 @@ TEST(TestReport, OfNothingIsStillAPage) {
     EXPECT_EQ(report_to_json(report).at("answer").at("kind"), "none");
 }
 
+TEST(TestReport, HasNoColumnThatNothingStandsIn) {
+    TestReport report;
+    report.channels = {{.name = "T1"}, {.name = "T2"}};
+    const std::string of_a_recording = report_to_html(report);
+    EXPECT_EQ(of_a_recording.find("read at"), std::string::npos);
+    EXPECT_EQ(of_a_recording.find(">calibration<"), std::string::npos);
+    report.channels[1].source = "unit 1, input 2";
+    report.channels[1].calibration = "offset 0.1";
+    const std::string of_a_daemon = report_to_html(report);
+    EXPECT_NE(of_a_daemon.find("read at"), std::string::npos);
+    EXPECT_NE(of_a_daemon.find("unit 1, input 2"), std::string::npos);
+    EXPECT_NE(of_a_daemon.find("offset 0.1"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace thermbal

@@ -23,6 +23,7 @@ def arguments():
     parser.add_argument("--every-ms", type=int, default=1500, help="between two scans of one daemon (in a real test 15000)")
     parser.add_argument("--kills", type=int, default=10)
     parser.add_argument("--settle-s", type=float, default=5.0)
+    parser.add_argument("--patience-s", type=float, default=600.0, help="after the last scan is written")
     parser.add_argument("--down-s", type=float, default=3.0, help="how long the broker is away")
     return parser.parse_args()
 
@@ -58,7 +59,7 @@ def main():
     most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
     options = arguments()
-    with tempfile.TemporaryDirectory(prefix="thermbal-hundred-") as folder, Broker(folder) as broker:
+    with tempfile.TemporaryDirectory(prefix="thermbal-hundred-") as folder, Broker(folder, written="each second") as broker:
         subscriber = Subscriber(folder, broker.port, topic="+/+/samples")
         writer = write_databases(folder, options.daemons, options.scans, options.every_ms)
         publishers = [Publisher(folder, configuration(folder, broker.port, machine=f"machine {k}", database=f"{k}.db",
@@ -70,7 +71,7 @@ def main():
         stored = {}
         for k in range(options.daemons):
             stored.update(stored_samples(f"{folder}/{k}.db"))
-        wait_for_the_rest(subscriber, publishers, len(stored), 300)
+        wait_for_the_rest(subscriber, publishers, len(stored), options.patience_s)
         time.sleep(5)  # revisions of the end
         took_s = time.monotonic() - written
         subscriber.stop()
