@@ -18,7 +18,7 @@ std::string explain_test(const TestConfig& test) {
                                   : std::string();
     return fmt::format(
         "[test]\nname = {}\nmachine = {}\nperiod_s = {}\n{}keep_measuring = {}\nstart = \"{}\"\n",
-        quoted(test.name), quoted(test.machine), test.period_s, limit, test.keep_measuring,
+        toml_quoted(test.name), toml_quoted(test.machine), test.period_s, limit, test.keep_measuring,
         test.start == TestConfig::Start::manual ? "manual" : "auto");
 }
 
@@ -35,10 +35,10 @@ std::string explain_serial(const LineConfig& line) {
         if (usb.usb_vid && usb.usb_pid) {
             parts.push_back(fmt::format("vid_pid = \"{:04x}:{:04x}\"", *usb.usb_vid, *usb.usb_pid));
         }
-        if (!usb.serial.empty()) parts.push_back("serial = " + quoted(usb.serial));
+        if (!usb.serial.empty()) parts.push_back("serial = " + toml_quoted(usb.serial));
         text += fmt::format("usb = {{ {} }}\n", fmt::join(parts, ", "));
     } else {
-        text += fmt::format("device = {}\n", quoted(line.link.device));
+        text += fmt::format("device = {}\n", toml_quoted(line.link.device));
     }
     const std::string_view parity = line.link.parity == 'N'   ? "none"
                                     : line.link.parity == 'E' ? "even"
@@ -49,12 +49,12 @@ std::string explain_serial(const LineConfig& line) {
 
 std::string explain_line(const LineConfig& line) {
     const LinkOptions& link = line.link;
-    std::string text = fmt::format("\n[[line]]\nname = {}\n", quoted(link.name));
+    std::string text = fmt::format("\n[[line]]\nname = {}\n", toml_quoted(link.name));
     if (link.transport == Transport::rtu) {
         text += "transport = \"rtu\"\n" + explain_serial(line);
     } else {
         text += fmt::format("transport = \"{}\"\nhost = {}\nport = {}\nconnect_timeout_ms = {}\n",
-                            link.transport == Transport::tcp ? "tcp" : "rtu_over_tcp", quoted(link.host),
+                            link.transport == Transport::tcp ? "tcp" : "rtu_over_tcp", toml_quoted(link.host),
                             link.port, milliseconds(link.connect_timeout_s));
     }
     return text +
@@ -74,28 +74,30 @@ std::string as_comment(const std::string& text) {
 std::string explain_unit(const Config& config, const UnitConfig& unit) {
     return fmt::format(
         "\n[[unit]]\nname = {}\nline = {}\nunit_id = {}\nprofile = {}\nfrozen_after_min = {}\n{}",
-        quoted(unit.name), quoted(config.lines[unit.line].link.name), unit.unit_id, quoted(unit.profile_name),
-        unit.frozen_after_min, as_comment(explain_profile(unit.profile)));
+        toml_quoted(unit.name), toml_quoted(config.lines[unit.line].link.name), unit.unit_id,
+        toml_quoted(unit.profile_name), unit.frozen_after_min, as_comment(explain_profile(unit.profile)));
 }
 
 std::string explain_calibration(const Calibration& calibration) {
     if (!calibration.certificate) return fmt::format("offset_C = {}\n", calibration.offset_C);
     const PlatinumCoefficients& sensor = *calibration.certificate;
     return fmt::format("certificate = {{ number = {}, R0_ohm = {}, A = {}, B = {}, C = {} }}\n",
-                       quoted(calibration.certificate_number), sensor.R0_ohm, sensor.A, sensor.B, sensor.C);
+                       toml_quoted(calibration.certificate_number), sensor.R0_ohm, sensor.A, sensor.B,
+                       sensor.C);
 }
 
 std::string explain_channel(const Config& config, const ChannelConfig& channel) {
     return fmt::format(
         "\n[[channel]]\nname = {}\nunit = {}\ninput = {}\nrole = \"{}\"\nplace = {}\nrequired = {}\n{}",
-        quoted(channel.name), quoted(config.units[channel.unit].name), channel.input,
-        channel.role == ChannelConfig::Role::ambient ? "ambient" : "structure", quoted(channel.place),
+        toml_quoted(channel.name), toml_quoted(config.units[channel.unit].name), channel.input,
+        channel.role == ChannelConfig::Role::ambient ? "ambient" : "structure", toml_quoted(channel.place),
         channel.required, explain_calibration(channel.calibration));
 }
 
 std::string explain_alarm(const Config& config, const AlarmConfig& alarm) {
-    std::string text = fmt::format("\n[[alarm]]\nname = {}\n", quoted(alarm.name));
-    if (alarm.channel) text += fmt::format("channel = {}\n", quoted(config.channels[*alarm.channel].name));
+    std::string text = fmt::format("\n[[alarm]]\nname = {}\n", toml_quoted(alarm.name));
+    if (alarm.channel)
+        text += fmt::format("channel = {}\n", toml_quoted(config.channels[*alarm.channel].name));
     if (alarm.above_C) text += fmt::format("above_C = {}\n", *alarm.above_C);
     if (alarm.below_C) text += fmt::format("below_C = {}\n", *alarm.below_C);
     if (alarm.rate_C_per_min) {
@@ -114,7 +116,7 @@ std::string explain_stop(const Config& config) {
             break;
         case StopConfig::Action::command: {
             std::vector<std::string> words(stop.command.size());
-            std::ranges::transform(stop.command, words.begin(), quoted);
+            std::ranges::transform(stop.command, words.begin(), toml_quoted);
             text += fmt::format("action = \"command\"\ncommand = [{}]\n", fmt::join(words, ", "));
             break;
         }
@@ -123,7 +125,7 @@ std::string explain_stop(const Config& config) {
             text += fmt::format(
                 "action = \"{}\"\nline = {}\nunit_id = {}\naddress = {}\nvalue = {}\n",
                 stop.action == StopConfig::Action::write_coil ? "write_coil" : "write_register",
-                quoted(config.lines[stop.line].link.name), stop.unit_id, stop.address, stop.value);
+                toml_quoted(config.lines[stop.line].link.name), stop.unit_id, stop.address, stop.value);
             break;
     }
     return text + fmt::format("timeout_s = {}\n", stop.timeout_s);
@@ -134,10 +136,10 @@ std::string explain_stop(const Config& config) {
 std::string explain_config(const Config& config) {
     const IdentificationConfig& identification = config.identification;
     std::string text = explain_test(config.test);
-    text += fmt::format("\n[store]\npath = {}\n", quoted(config.store.path));
-    text += fmt::format("\n[service]\nsocket = {}\noperators_group = {}\n", quoted(config.service.socket),
-                        quoted(config.service.operators_group));
-    text += fmt::format("\n[log]\nlevel = {}\n", quoted(config.log.level));
+    text += fmt::format("\n[store]\npath = {}\n", toml_quoted(config.store.path));
+    text += fmt::format("\n[service]\nsocket = {}\noperators_group = {}\n",
+                        toml_quoted(config.service.socket), toml_quoted(config.service.operators_group));
+    text += fmt::format("\n[log]\nlevel = {}\n", toml_quoted(config.log.level));
     text += fmt::format(
         "\n[identification]\ntolerance_C = {}\nmax_lag = {}\nevery_s = {}\nsweep_always = {}\nworkers = {}\n",
         identification.tolerance_C, identification.max_lag, identification.every_s,

@@ -14,7 +14,6 @@ namespace thermbal {
 namespace {
 
 constexpr Range positive{1e-9, 1e12};
-constexpr Range any_number{-1e12, 1e12};
 constexpr Range temperature_C{-100.0, 1000.0};
 constexpr Range relative{0.0, 10.0};
 
@@ -97,7 +96,7 @@ class ModelLoader {
     }
 
     void read_link(TableReader& reader, const toml::table& table) {
-        Link link;
+        ThermalLink link;
         reader.require("between", "[\"node\", \"node\"]; \"ambient\" is a node, too");
         if (const auto ends = reader.texts("between")) {
             if (ends->size() == 2)

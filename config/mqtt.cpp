@@ -42,7 +42,7 @@ void read_tls(TableReader& reader, MqttConfig& mqtt) {
 }
 
 std::string optional_line(std::string_view key, const std::string& value) {
-    return value.empty() ? std::string() : fmt::format("{} = {}\n", key, quoted(value));
+    return value.empty() ? std::string() : fmt::format("{} = {}\n", key, toml_quoted(value));
 }
 
 }  // namespace
@@ -72,8 +72,9 @@ MqttConfig read_mqtt(TableReader& reader) {
 }
 
 std::string explain_mqtt(const MqttConfig& mqtt) {
-    std::string text = fmt::format("\n[mqtt]\nhost = {}\nport = {}\ntls = {}\ntopic_prefix = {}\n",
-                                   quoted(mqtt.host), mqtt.port, mqtt.tls, quoted(mqtt.topic_prefix));
+    std::string text =
+        fmt::format("\n[mqtt]\nhost = {}\nport = {}\ntls = {}\ntopic_prefix = {}\n", toml_quoted(mqtt.host),
+                    mqtt.port, mqtt.tls, toml_quoted(mqtt.topic_prefix));
     text += optional_line("ca_file", mqtt.ca_file);
     text += optional_line("certificate_file", mqtt.certificate_file);
     text += optional_line("key_file", mqtt.key_file);

@@ -9,8 +9,6 @@
 namespace thermbal {
 namespace {
 
-constexpr Range any_number{-1e12, 1e12};
-
 struct NumberRange {
     double low;
     double high;
@@ -146,7 +144,7 @@ std::string explain_profile(const ModuleProfile& profile) {
         "name = {}\nsource = {}\nfunction = {}\nfirst_register = {}\ninputs = {}\nstride = {}\ntype = "
         "\"{}\"\n"
         "byte_order = \"{}\"\nscale = {}\noffset_C = {}\nvalid_min_C = {}\nvalid_max_C = {}\nnan = \"{}\"\n",
-        quoted(profile.name), quoted(profile.source), profile.function, profile.first_register,
+        toml_quoted(profile.name), toml_quoted(profile.source), profile.function, profile.first_register,
         profile.inputs, profile.stride, to_string(profile.type), to_string(profile.byte_order), profile.scale,
         profile.offset_C, profile.valid_min_C, profile.valid_max_C, to_string(profile.nan_quality));
     if (profile.type_code) {

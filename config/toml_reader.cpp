@@ -13,7 +13,7 @@ namespace thermbal {
 namespace {
 
 std::string shown(const toml::node& node) {
-    if (const auto text = node.value_exact<std::string>()) return quoted(*text);
+    if (const auto text = node.value_exact<std::string>()) return toml_quoted(*text);
     std::ostringstream text;
     node.visit([&](const auto& value) { text << value; });
     std::string one_line = text.str();
@@ -214,7 +214,7 @@ void TableReader::finish() {
     }
 }
 
-std::string quoted(std::string_view text) {
+std::string toml_quoted(std::string_view text) {
     std::string result = "\"";
     for (const char c : text) {
         if (c == '"' || c == '\\')

@@ -41,6 +41,7 @@ struct Range {
     double low;
     double high;
 };
+inline constexpr Range any_number{-1e12, 1e12};
 
 /// Takes the keys of one table, each with its type and range. What nobody took is an unknown key: finish()
 /// says so and proposes the nearest one. A key that is missing or refused gives nothing; the caller keeps its

@@ -36,20 +36,19 @@ while [ $# -gt 0 ]; do
     case $check in
         style) sources | xargs clang-format-19 --dry-run --Werror ;;
         tidy)
-            cmake --preset release > /dev/null
+            cmake --preset tidy > /dev/null
             tests/tidy.py
             ;;
         tidy-changed)
-            cmake --preset release > /dev/null
+            cmake --preset tidy > /dev/null
             tests/tidy.py --changed-since "${THERMBAL_BASE:-HEAD~1}"
             ;;
         clang) build clang thermbald thermbalctl thermbal-sim ;;
         asan)
-            # The rooms that bytes from outside reach.
-            build asan series_test config_test store_test store_kill_test service_test acquisition_test simulator_test
-            for test in series config store store_kill service acquisition simulator; do
-                build/asan/tests/${test}_test --gtest_brief=1
-            done
+            # The rooms that bytes from outside reach, in the build of the fuzz targets: it has both sanitizers.
+            tests=(series config store store_kill service acquisition simulator)
+            build fuzz "${tests[@]/%/_test}"
+            for test in "${tests[@]}"; do build/fuzz/tests/${test}_test --gtest_brief=1; done
             ;;
         tsan)
             build tsan acquisition_test compute_test

@@ -1,6 +1,6 @@
 """clang-tidy on every source, or on what a change touches; two at a time.
 
-    tests/tidy.py [--changed-since COMMIT] [--build build/release]
+    tests/tidy.py [--changed-since COMMIT] [--build build/tidy]
 
 A source that passed is not judged again while nothing it depends on has changed: what counts is its whole text after
 preprocessing (comments kept: NOLINT is one), its compile command, .clang-tidy and the version of clang-tidy. Passed ones are
@@ -78,7 +78,7 @@ def touched(entries, commit):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--changed-since", metavar="COMMIT")
-    parser.add_argument("--build", default="build/release")
+    parser.add_argument("--build", default="build/tidy")
     arguments = parser.parse_args()
     tracked = {str(pathlib.Path(name).resolve()) for name in output_of("git", "ls-files", "*.cpp").split()}
     database = json.loads((pathlib.Path(arguments.build) / "compile_commands.json").read_text(encoding="utf-8"))

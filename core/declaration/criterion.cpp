@@ -7,15 +7,10 @@
 
 #include <fmt/format.h>
 
+#include "base/median.hpp"
+
 namespace thermbal {
 namespace {
-
-double median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::ranges::nth_element(values, middle);
-    if (values.size() % 2 == 1) return *middle;
-    return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
 
 double upper_decile(std::vector<double> values) {
     const auto rank =

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "base/median.hpp"
 #include "series/sample.hpp"
 
 namespace thermbal {
@@ -68,9 +70,7 @@ std::optional<double> room_step_C(std::span<const double> room_C, std::size_t en
         if (std::isfinite(value)) then_C.push_back(value);
     }
     if (then_C.empty() || !std::isfinite(now_C)) return std::nullopt;
-    const auto middle = then_C.begin() + static_cast<std::ptrdiff_t>(then_C.size() / 2);
-    std::ranges::nth_element(then_C, middle);
-    return std::abs(now_C - *middle);
+    return std::abs(now_C - upper_median(std::move(then_C)));
 }
 
 /// A door that has just opened is not found as a change yet; the room's sensor shows it within two minutes.
@@ -202,10 +202,7 @@ double median_move_C(const TestWindow& window, std::size_t since) {
         const auto then = std::ranges::find_if(rest, [](double value) { return std::isfinite(value); });
         if (then != rest.end()) moved_C.push_back(std::abs(last_good(rest) - *then));
     }
-    if (moved_C.empty()) return 0.0;
-    const auto middle = moved_C.begin() + static_cast<std::ptrdiff_t>(moved_C.size() / 2);
-    std::ranges::nth_element(moved_C, middle);
-    return *middle;
+    return moved_C.empty() ? 0.0 : upper_median(std::move(moved_C));
 }
 
 /// The very same reading while the other channels warm: a sensor or an input that does not measure any more.

@@ -6,23 +6,14 @@
 #include <Eigen/Dense>
 #include <fmt/format.h>
 
+#include "base/median.hpp"
+#include "within.hpp"
+
 namespace thermbal {
 namespace {
 
 constexpr std::size_t fewest_samples = 8;
 constexpr double mad_of_unit_normal = 0.6744897501960817;
-
-/// False for NaN.
-bool within(double value, double lowest, double highest) {
-    return value >= lowest && value <= highest;
-}
-
-double median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::ranges::nth_element(values, middle);
-    if (values.size() % 2 == 1) return *middle;
-    return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
 
 /// From the finest details of the signal itself: an extension without noise would dilute them.
 double noise_scale(std::span<const double> signal, const Wavelet& wavelet, const DenoiseOptions& options) {

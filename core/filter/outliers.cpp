@@ -6,21 +6,13 @@
 
 #include <fmt/format.h>
 
+#include "base/median.hpp"
+#include "within.hpp"
+
 namespace thermbal {
 namespace {
 
 constexpr double sd_per_mad = 1.482602218505602;
-
-/// False for NaN.
-bool within(double value, double lowest, double highest) {
-    return value >= lowest && value <= highest;
-}
-
-double median_of(std::vector<double>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::ranges::nth_element(values, middle);
-    return *middle;
-}
 
 /// A sample against the robust line through its neighbours.
 struct Deviation {
@@ -40,9 +32,9 @@ class NeighbourLine {
         const double slope = theil_sen_slope();
         residuals_.clear();
         for (const std::size_t i : at_) residuals_.push_back(values_[i] - slope * offset(i, k));
-        const double level = median_of(residuals_);
+        const double level = upper_median(residuals_);
         for (double& residual : residuals_) residual = std::abs(residual - level);
-        return {values_[k] - level, median_of(residuals_), true};
+        return {values_[k] - level, upper_median(residuals_), true};
     }
 
   private:
@@ -66,7 +58,7 @@ class NeighbourLine {
                 slopes_.push_back((values_[at_[b]] - values_[at_[a]]) / offset(at_[b], at_[a]));
             }
         }
-        return median_of(slopes_);
+        return upper_median(slopes_);
     }
 
     std::span<const double> values_;
@@ -81,7 +73,7 @@ double overall_noise_sd_C(const std::vector<Deviation>& deviations, double small
     for (const Deviation& deviation : deviations) {
         if (deviation.known) sizes.push_back(std::abs(deviation.from_line_C));
     }
-    return sizes.empty() ? smallest_C : std::max(smallest_C, sd_per_mad * median_of(sizes));
+    return sizes.empty() ? smallest_C : std::max(smallest_C, sd_per_mad * upper_median(sizes));
 }
 
 /// The newest finite sample before `end`, or 0.

@@ -45,8 +45,8 @@ double CalibratedParameter::learned() const {
     return std::max(0.0, 1.0 - share * share);
 }
 
-Result<Calibration> calibrate(const Model& model, const RecordedTest& test,
-                              const CalibrationOptions& options) {
+Result<ModelCalibration> calibrate(const Model& model, const RecordedTest& test,
+                                   const CalibrationOptions& options) {
     if (const auto valid = validate(model); !valid) return std::unexpected(valid.error());
     const auto data = make_fit_data(model, test, options);
     if (!data) return std::unexpected(data.error());
@@ -57,7 +57,7 @@ Result<Calibration> calibrate(const Model& model, const RecordedTest& test,
     if (!fit) return std::unexpected(fit.error());
     const auto after = problem.evaluate(model_alone(problem, fit->point.coordinates));
     if (!after) return std::unexpected(after.error());
-    Calibration result;
+    ModelCalibration result;
     result.model = fit->model;
     result.parameters = describe(problem, *fit);
     state_sigmas(result.model, result.parameters);

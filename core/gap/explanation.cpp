@@ -6,6 +6,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "base/median.hpp"
+
 namespace thermbal {
 namespace {
 
@@ -19,12 +21,6 @@ Eigen::VectorXd coordinates_from(const FitProblem& problem, const Fit& neighbour
     return coordinates;
 }
 
-double median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::ranges::nth_element(values, middle);
-    return *middle;
-}
-
 /// Before the spindle starts the machine is about as warm everywhere as the spread of all first readings says
 /// (Student's t, three degrees of freedom: a warm corner is no miracle). Speaks for an offset that brings its
 /// sensor back to the others, and against one that takes it away from them.
@@ -32,9 +28,9 @@ double start_consensus(const FitData& data, const Model& model) {
     std::vector<double> first_C, away_C;
     for (const auto& reading : data.seen.inputs.first_readings) first_C.push_back(reading.value_C);
     if (first_C.size() < 4) return 0.0;
-    const double middle_C = median(first_C);
+    const double middle_C = upper_median(first_C);
     for (const double value_C : first_C) away_C.push_back(std::abs(value_C - middle_C));
-    const double spread_C = std::hypot(1.48 * median(away_C), 0.5 * data.seen.scan_sigma_C.mean());
+    const double spread_C = std::hypot(1.48 * upper_median(away_C), 0.5 * data.seen.scan_sigma_C.mean());
     const auto log_density = [&](double reading_C) {
         const double z = (reading_C - middle_C) / spread_C;
         return -2.0 * std::log1p(z * z / 3.0);

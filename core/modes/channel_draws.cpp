@@ -4,13 +4,13 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/units.hpp"
 #include "random.hpp"
 
 namespace thermbal {
 
 namespace {
 
-constexpr double seconds_per_min = 60.0;
 constexpr std::size_t curve_draws = 60;
 constexpr double settled_share = 0.95;
 

@@ -6,11 +6,13 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "base/median.hpp"
+#include "base/units.hpp"
+
 namespace thermbal {
 
 namespace {
 
-constexpr double seconds_per_min = 60.0;
 constexpr double reference_minutes = 3.0;
 
 double mean_of_good(const std::vector<double>& values, std::size_t first, std::size_t last) {
@@ -53,12 +55,6 @@ std::vector<double> lagged(const std::vector<double>& input, double period_min, 
     return output;
 }
 
-double median(std::vector<double>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-}
-
 void reject_spikes(std::vector<double>& values) {
     constexpr std::size_t reach = 4;
     constexpr double sigmas = 5.0;
@@ -74,14 +70,14 @@ void reject_spikes(std::vector<double>& values) {
         for (std::size_t other = k < reach ? 0 : k - reach; other < last; ++other) {
             if (!std::isnan(values[other])) near.push_back(values[other]);
         }
-        const double centre = median(near);
+        const double centre = upper_median(near);
         deviation[k] = std::abs(values[k] - centre);
         for (double& value : near) value = std::abs(value - centre);
-        local_scatter[k] = median(near);
+        local_scatter[k] = upper_median(near);
         all.push_back(deviation[k]);
     }
     if (all.empty()) return;
-    const double typical = std::max(sigma_per_mad * median(all), 0.3 * smallest_step(values));
+    const double typical = std::max(sigma_per_mad * upper_median(all), 0.3 * smallest_step(values));
     for (std::size_t k = 0; k < values.size(); ++k) {
         const double scatter = std::max(typical, sigma_per_mad * local_scatter[k]);
         if (!std::isnan(values[k]) && deviation[k] > sigmas * scatter) values[k] = std::nan("");

@@ -8,13 +8,13 @@
 #include <Eigen/QR>
 #include <fmt/format.h>
 
+#include "base/units.hpp"
 #include "design.hpp"
 
 namespace thermbal {
 
 namespace {
 
-constexpr double seconds_per_min = 60.0;
 constexpr double two_sided_90 = 1.6448536269514722;
 constexpr double infinity = std::numeric_limits<double>::infinity();
 

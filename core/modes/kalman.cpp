@@ -5,11 +5,12 @@
 
 #include <fmt/format.h>
 
+#include "base/units.hpp"
+
 namespace thermbal {
 
 namespace {
 
-constexpr double seconds_per_min = 60.0;
 constexpr double fastest_log_min = -0.7;  // 0.5 min
 constexpr double slowest_log_min = 6.7;   // 810 min
 constexpr double least_variance = 1e-12;

@@ -8,13 +8,13 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
+#include "base/units.hpp"
 #include "design.hpp"
 
 namespace thermbal {
 
 namespace {
 
-constexpr double seconds_per_min = 60.0;
 constexpr double least_segment_min = 14.0;
 
 void speed_changes(const TestWindow& window, const RegimeOptions& options,

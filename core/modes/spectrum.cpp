@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/units.hpp"
 #include "channel_draws.hpp"
 #include "spectrum_problem.hpp"
 
@@ -10,7 +11,6 @@ namespace thermbal {
 
 namespace {
 
-constexpr double seconds_per_min = 60.0;
 constexpr double carried_share = 0.05;
 constexpr double sds_of_90_percent = 1.645;
 

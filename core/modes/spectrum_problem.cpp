@@ -5,6 +5,8 @@
 
 #include <fmt/format.h>
 
+#include "base/median.hpp"
+#include "base/units.hpp"
 #include "generic_prior.hpp"
 #include "series/sample.hpp"
 #include "shared_response.hpp"
@@ -13,7 +15,6 @@ namespace thermbal {
 
 namespace {
 
-constexpr double seconds_per_min = 60.0;
 constexpr double minimum_window_min = 8.0;
 constexpr std::size_t fewest_good_samples = 16;
 
@@ -88,12 +89,6 @@ Result<void> check_prior(const std::optional<SpectrumPrior>& prior, const Spectr
             "the archive's spectrum has {} time constants, the options ask for {}: learn it again from "
             "the stored tests",
             prior->time_constant_min.size(), points));
-}
-
-double median(std::vector<double> values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
 }
 
 /// +1 if all channels warm, -1 if all cool, towards 0 as they disagree: then nothing is said about signs.
@@ -175,7 +170,7 @@ Result<std::vector<ObservedChannel>> observed_channels(const SpectrumProblem& pr
 void give_scales(std::vector<ObservedChannel>& channels, double scale_floor) {
     std::vector<double> ranges_C;
     for (const ObservedChannel& channel : channels) ranges_C.push_back(channel.data.range_C);
-    const double common_C = scale_floor * median(ranges_C);
+    const double common_C = scale_floor * upper_median(ranges_C);
     for (ObservedChannel& channel : channels) {
         channel.scale_C = std::sqrt(channel.data.range_C * channel.data.range_C + common_C * common_C +
                                     9.0 * channel.data.sample_variance);

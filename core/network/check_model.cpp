@@ -87,13 +87,13 @@ class Checker {
     }
 
     void check_link(std::size_t i) {
-        const Link& link = model_.links[i];
+        const ThermalLink& link = model_.links[i];
         check_node_name(Table::link, i, "between", link.a, true);
         check_node_name(Table::link, i, "between", link.b, true);
         if (link.a == link.b) {
             complain(Table::link, i, "between", fmt::format("\"{}\" twice; accepted: two nodes", link.a));
         }
-        const auto same = [&](const Link& other) {
+        const auto same = [&](const ThermalLink& other) {
             return (other.a == link.a && other.b == link.b) || (other.a == link.b && other.b == link.a);
         };
         if (std::find_if(model_.links.begin(), model_.links.begin() + static_cast<std::ptrdiff_t>(i), same) !=
@@ -110,7 +110,7 @@ class Checker {
         std::set<std::string, std::less<>> reached = {std::string(ambient_node)};
         for (std::size_t before = 0; before != reached.size();) {
             before = reached.size();
-            for (const Link& link : model_.links) {
+            for (const ThermalLink& link : model_.links) {
                 if (reached.contains(link.a)) reached.insert(link.b);
                 if (reached.contains(link.b)) reached.insert(link.a);
             }

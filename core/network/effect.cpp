@@ -20,13 +20,14 @@ double prior_unit(PriorUnit unit, const Model& model) {
             for (const Source& source : model.sources) sum += source.power_W.value;
             if (sum > 0.0) return sum / static_cast<double>(model.sources.size());
             // Without a source: what would warm the machine by about 10 K.
-            for (const Link& link : model.links) {
+            for (const ThermalLink& link : model.links) {
                 if (link.to_ambient()) sum += 10.0 * link.conductance_W_per_K.value;
             }
             return std::max(sum, 1e-3);
         }
         case PriorUnit::mean_conductance:
-            return geometric_mean(model.links, [](const Link& link) { return link.conductance_W_per_K; });
+            return geometric_mean(model.links,
+                                  [](const ThermalLink& link) { return link.conductance_W_per_K; });
         case PriorUnit::mean_capacity:
             return geometric_mean(model.nodes, [](const Node& node) { return node.heat_capacity_J_per_K; });
         case PriorUnit::absolute:
@@ -106,7 +107,7 @@ std::vector<std::string> possible_places(const EffectForm& form, const Model& mo
             for (const Source& source : model.sources) places.push_back(source.name);
             break;
         case EffectSite::ambient_link:
-            for (const Link& link : model.links) {
+            for (const ThermalLink& link : model.links) {
                 if (link.to_ambient()) places.push_back(link.surface_node());
             }
             break;

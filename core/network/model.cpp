@@ -33,7 +33,7 @@ std::optional<std::size_t> find_sensor(const Model& model, std::string_view chan
 }
 
 std::optional<std::size_t> find_ambient_link(const Model& model, std::string_view surface_node) {
-    const auto found = std::ranges::find_if(model.links, [&](const Link& link) {
+    const auto found = std::ranges::find_if(model.links, [&](const ThermalLink& link) {
         return link.to_ambient() && link.surface_node() == surface_node;
     });
     if (found == model.links.end()) return std::nullopt;
@@ -42,7 +42,7 @@ std::optional<std::size_t> find_ambient_link(const Model& model, std::string_vie
 
 std::vector<std::string> neighbours(const Model& model, std::string_view node) {
     std::vector<std::string> names;
-    for (const Link& link : model.links) {
+    for (const ThermalLink& link : model.links) {
         if (link.to_ambient()) continue;
         if (link.a == node) names.push_back(link.b);
         if (link.b == node) names.push_back(link.a);

@@ -19,7 +19,7 @@ NetworkBuilder::NetworkBuilder(const Model& model, InputSchedule& schedule) : sc
         network_.capacity_J_per_K.push_back(node.heat_capacity_J_per_K.value);
     }
     network_.surface_W_per_K.assign(model.nodes.size(), 0.0);
-    for (const Link& link : model.links) {
+    for (const ThermalLink& link : model.links) {
         const double conductance = link.conductance_W_per_K.value;
         if (link.to_ambient())
             network_.surface_W_per_K[index_of(model, link.surface_node())] += conductance;

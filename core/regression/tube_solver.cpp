@@ -7,19 +7,13 @@
 
 #include <Eigen/Dense>
 
+#include "base/median.hpp"
+
 namespace thermbal {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-namespace {
-
-Index padded(Index count) {
-    return static_cast<Index>(vector_loops::padded(static_cast<std::size_t>(count)));
-}
-
-}  // namespace
 
 TubeSolver::TubeSolver(MatrixXd features, VectorXd targets, double epsilon)
     : features_(std::move(features)),
@@ -33,10 +27,7 @@ TubeSolver::TubeSolver(MatrixXd features, VectorXd targets, double epsilon)
       change_(targets_.size()) {}
 
 TubeSolver::State TubeSolver::cold_start() const {
-    std::vector<double> sorted(targets_.begin(), targets_.end());
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::ranges::nth_element(sorted, middle);
-    return {VectorXd::Zero(features_.cols()), *middle};
+    return {VectorXd::Zero(features_.cols()), upper_median({targets_.begin(), targets_.end()})};
 }
 
 void TubeSolver::start(double C, const State& start) {
@@ -115,17 +106,10 @@ void TubeSolver::take_slopes() {
 void TubeSolver::newton_direction() {
     const double curvature = tube_.C / tube_.smoothing;
     const auto rows = static_cast<Index>(bending_.size());
-    const Index rank = features_.cols();
     if (rows == 0) {
         direction_ = -gradient_;
         bias_direction_ = -bias_gradient_ / (1e-3 * curvature);
-        return;
-    }
-    bent_.setZero(padded(rank), rows);
-    for (Index k = 0; k < rows; ++k) {
-        bent_.col(k).head(rank) = by_row_.col(bending_[static_cast<std::size_t>(k)]);
-    }
-    if (rows > rank) {
+    } else if (rows > features_.cols()) {
         direction_in_feature_space(curvature);
     } else {
         direction_in_row_space(curvature);
@@ -134,79 +118,30 @@ void TubeSolver::newton_direction() {
 
 void TubeSolver::direction_in_feature_space(double curvature) {
     const Index rank = features_.cols();
-    const VectorXd mean = bent_.rowwise().mean();
-    bent_.colwise() -= mean;
-    auto system = square_of(bent_, rank);
-    system *= curvature;
-    system.diagonal().array() += 1.0;
-    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(system);
-    direction_ = factor.solve(mean.head(rank) * bias_gradient_ - gradient_);
-    bias_direction_ =
-        -bias_gradient_ / (curvature * static_cast<double>(bent_.cols())) - mean.head(rank).dot(direction_);
+    const auto rows = static_cast<double>(bending_.size());
+    const MatrixXd& gram = feature_gram_.over(by_row_, bending_);
+    VectorXd mean = VectorXd::Zero(rank);
+    for (const Index row : bending_) mean += by_row_.col(row);
+    mean /= rows;
+    system_ = curvature * gram.topLeftCorner(rank, rank);
+    system_.selfadjointView<Eigen::Lower>().rankUpdate(mean, -curvature * rows);
+    system_.diagonal().array() += 1.0;
+    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(system_);
+    direction_ = factor.solve(mean * bias_gradient_ - gradient_);
+    bias_direction_ = -bias_gradient_ / (curvature * rows) - mean.dot(direction_);
 }
 
 void TubeSolver::direction_in_row_space(double curvature) {
-    const Index rank = features_.cols();
-    const Index rows = bent_.cols();
-    bring_row_gram_up_to_date();
-    square_ = row_gram_;
-    square_.diagonal().array() += 1.0 / curvature;
-    Eigen::Ref<MatrixXd> system(square_);
-    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(system);
-    const auto bent = bent_.topRows(rank);
-    const VectorXd without_bias = factor.solve(-(bent.transpose() * gradient_));
+    const auto rows = static_cast<Index>(bending_.size());
+    bent_.resize(features_.cols(), rows);
+    for (Index k = 0; k < rows; ++k) bent_.col(k) = by_row_.col(bending_[static_cast<std::size_t>(k)]);
+    system_ = row_gram_.over(bent_, bending_);
+    system_.diagonal().array() += 1.0 / curvature;
+    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(system_);
+    const VectorXd without_bias = factor.solve(-(bent_.transpose() * gradient_));
     const VectorXd of_bias = factor.solve(VectorXd::Ones(rows));
     bias_direction_ = (-bias_gradient_ - without_bias.sum()) / of_bias.sum();
-    direction_ = -gradient_ - bent * (without_bias + bias_direction_ * of_bias);
-}
-
-/// The inner products of the bending rows, lower triangle. From one step to the next few rows begin or cease
-/// to bend: the products of those that stay are kept.
-void TubeSolver::bring_row_gram_up_to_date() {
-    const Index rank = features_.cols();
-    const auto rows = static_cast<Index>(bending_.size());
-    kept_.clear();
-    fresh_.clear();
-    for (Index k = 0, old = 0; k < rows; ++k) {
-        const Index row = bending_[static_cast<std::size_t>(k)];
-        while (old < static_cast<Index>(gram_rows_.size()) && gram_rows_[static_cast<std::size_t>(old)] < row)
-            ++old;
-        const bool stays =
-            old < static_cast<Index>(gram_rows_.size()) && gram_rows_[static_cast<std::size_t>(old)] == row;
-        if (stays) {
-            kept_.emplace_back(k, old);
-        } else {
-            fresh_.push_back(k);
-        }
-    }
-    if (2 * fresh_.size() > bending_.size()) {
-        by_feature_.setZero(padded(rows), rank);
-        by_feature_.topRows(rows) = bent_.topRows(rank).transpose();
-        row_gram_ = square_of(by_feature_, rows);
-    } else {
-        new_gram_.resize(rows, rows);
-        for (const auto& [column, old_column] : kept_) {
-            for (const auto& [row, old_row] : kept_) {
-                if (row >= column) new_gram_(row, column) = row_gram_(old_row, old_column);
-            }
-        }
-        const auto bent = bent_.topRows(rank);
-        for (const Index k : fresh_) {
-            const VectorXd products = bent.transpose() * bent.col(k);
-            new_gram_.row(k).head(k + 1) = products.head(k + 1).transpose();
-            new_gram_.col(k).tail(rows - k) = products.tail(rows - k);
-        }
-        std::swap(row_gram_, new_gram_);
-    }
-    gram_rows_ = bending_;
-}
-
-/// The lower triangle of the sum of v v' over the columns v of `vectors`, without the padding.
-Eigen::Ref<MatrixXd> TubeSolver::square_of(const MatrixXd& vectors, Index length) {
-    square_.setZero(vectors.rows(), vectors.rows());
-    vector_loops::add_outer_products(vectors.data(), static_cast<std::size_t>(vectors.rows()),
-                                     static_cast<std::size_t>(vectors.cols()), square_.data());
-    return square_.topLeftCorner(length, length);
+    direction_ = -gradient_ - bent_ * (without_bias + bias_direction_ * of_bias);
 }
 
 /// The objective along the direction is convex and piecewise quadratic: safeguarded Newton to a slope a fifth

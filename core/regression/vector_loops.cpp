@@ -97,7 +97,7 @@ void subtract_columns(const double* __restrict matrix, std::size_t rows, std::si
 
 /// Blocks of 8 x 4 elements stay in registers over all vectors.
 THERMBAL_EVERY_WIDTH
-void add_outer_products(const double* __restrict vectors, std::size_t length, std::size_t count,
+void add_outer_products(const double* __restrict vectors, std::size_t length, std::size_t count, double sign,
                         double* __restrict lower) {
     constexpr std::size_t block_columns = 4;
     for (std::size_t j = 0; j < length; j += block_columns) {
@@ -117,7 +117,7 @@ void add_outer_products(const double* __restrict vectors, std::size_t length, st
             }
             for (std::size_t c = 0; c < block_columns; ++c) {
                 double* column = lower + (j + c) * length + i;
-                for (std::size_t lane = 0; lane < lanes; ++lane) column[lane] += sums[c][lane];
+                for (std::size_t lane = 0; lane < lanes; ++lane) column[lane] += sign * sums[c][lane];
             }
         }
     }

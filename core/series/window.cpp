@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "base/median.hpp"
 #include "series/recorded_test.hpp"
 #include "series/sample.hpp"
 
@@ -41,9 +43,7 @@ double median_step_s(const RecordedTest& test) {
     std::vector<double> steps;
     steps.reserve(test.time_s.size() - 1);
     for (std::size_t i = 1; i < test.time_s.size(); ++i) steps.push_back(test.time_s[i] - test.time_s[i - 1]);
-    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-    std::ranges::nth_element(steps, middle);
-    return *middle;
+    return upper_median(std::move(steps));
 }
 
 TestWindow to_window(const RecordedTest& test, double period_s) {

@@ -40,7 +40,7 @@ Interval interval(const CalibratedParameter& fitted) {
 }
 
 /// Per channel, over the bins in which it was measured.
-double rmse_C(const Calibration& calibration, Eigen::Index channel) {
+double rmse_C(const ModelCalibration& calibration, Eigen::Index channel) {
     double sum = 0.0;
     double count = 0.0;
     for (const double residual_C : calibration.residual_C.col(channel)) {
@@ -51,7 +51,7 @@ double rmse_C(const Calibration& calibration, Eigen::Index channel) {
     return std::sqrt(sum / count);
 }
 
-json parameters_json(const Calibration& calibration) {
+json parameters_json(const ModelCalibration& calibration) {
     json list = json::array();
     for (const CalibratedParameter& fitted : calibration.parameters) {
         const auto [low, high] = interval(fitted);
@@ -68,7 +68,7 @@ json parameters_json(const Calibration& calibration) {
     return list;
 }
 
-json as_json(const CalibrateCommand& command, const Calibration& calibration) {
+json as_json(const CalibrateCommand& command, const ModelCalibration& calibration) {
     json channels = json::array();
     for (std::size_t i = 0; i < calibration.channels.size(); ++i) {
         channels.push_back({{"channel", calibration.channels[i]},
@@ -89,7 +89,7 @@ std::string verdict_on(const CalibratedParameter& fitted) {
     return informed(fitted) ? "" : "the test says nothing about it";
 }
 
-std::string as_text(const CalibrateCommand& command, const Calibration& calibration) {
+std::string as_text(const CalibrateCommand& command, const ModelCalibration& calibration) {
     TextTable table({{"number", false},
                      {"given", true},
                      {"fitted", true},
@@ -110,7 +110,7 @@ std::string as_text(const CalibrateCommand& command, const Calibration& calibrat
                calibration.converged ? "" : "; the fit has not converged");
 }
 
-std::string comment_on(const CalibrateCommand& command, const Calibration& calibration) {
+std::string comment_on(const CalibrateCommand& command, const ModelCalibration& calibration) {
     std::string text = fmt::format(
         "Calibrated by thermbalctl calibrate on {}:\noff by {:.3f} C as given, {:.3f} C as "
         "fitted. relative_sigma is how well a number is known now.\n",

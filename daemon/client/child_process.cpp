@@ -13,6 +13,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/errno_text.hpp"
+
 namespace thermbal {
 namespace {
 
@@ -34,22 +36,20 @@ using Clock = std::chrono::steady_clock;
 
 Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& words, bool read_output) {
     if (access(words.front().c_str(), X_OK) != 0)
-        return fail(NextStep::stop,
-                    fmt::format("{}: {}", words.front(), std::generic_category().message(errno)));
+        return fail(NextStep::stop, fmt::format("{}: {}", words.front(), errno_text(errno)));
     std::vector<char*> arguments;
     for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
     arguments.push_back(nullptr);
     std::array<int, 2> ends = {-1, -1};
     if (read_output && pipe2(ends.data(), O_CLOEXEC) != 0)
-        return fail(NextStep::stop, fmt::format("pipe: {}", std::generic_category().message(errno)));
+        return fail(NextStep::stop, fmt::format("pipe: {}", errno_text(errno)));
     const pid_t parent = getpid();
     const pid_t pid = fork();
     if (pid == 0) become(arguments, ends[1], parent);
     if (ends[1] >= 0) close(ends[1]);
     if (pid < 0) {
         if (ends[0] >= 0) close(ends[0]);
-        return fail(NextStep::stop,
-                    fmt::format("{}: {}", words.front(), std::generic_category().message(errno)));
+        return fail(NextStep::stop, fmt::format("{}: {}", words.front(), errno_text(errno)));
     }
     return ChildProcess(pid, ends[0]);
 }

@@ -14,11 +14,12 @@ std::string line_text(const LinkOptions& link) {
         return text + fmt::format(
                           "transport = \"rtu\"\ndevice = {}    # a path of /dev/serial/by-id stays after "
                           "replugging\nbaud = {}\nparity = \"{}\"\nresponse_timeout_ms = {}\n",
-                          thermbal::quoted(link.device), link.baud, parity, link.response_timeout_s * 1000.0);
+                          thermbal::toml_quoted(link.device), link.baud, parity,
+                          link.response_timeout_s * 1000.0);
     }
     return text + fmt::format("transport = \"{}\"\nhost = {}\nport = {}\nresponse_timeout_ms = {}\n",
                               link.transport == Transport::tcp ? "tcp" : "rtu_over_tcp",
-                              thermbal::quoted(link.host), link.port, link.response_timeout_s * 1000.0);
+                              thermbal::toml_quoted(link.host), link.port, link.response_timeout_s * 1000.0);
 }
 
 std::string unit_text(const NewConfiguration::Unit& unit) {
@@ -26,7 +27,7 @@ std::string unit_text(const NewConfiguration::Unit& unit) {
         "\n[[unit]]                     # one module\nname = \"unit {}\"\nline = \"line\"\nunit_id = "
         "{}\nprofile = "
         "{}    # its register map\n",
-        unit.unit_id, unit.unit_id, thermbal::quoted(unit.profile));
+        unit.unit_id, unit.unit_id, thermbal::toml_quoted(unit.profile));
 }
 
 std::string channel_text(const NewConfiguration& wanted, const NewConfiguration::Channel& channel) {
@@ -34,7 +35,7 @@ std::string channel_text(const NewConfiguration& wanted, const NewConfiguration:
         channel.ambient ? "role = \"ambient\"             # the room: the reference, never required\n" : "";
     return fmt::format("\n[[channel]]\nname = \"{}\"\nunit = \"unit {}\"\ninput = {}\n{}place = {}\n",
                        channel.name, wanted.units[channel.unit].unit_id, channel.input, role,
-                       thermbal::quoted(channel.place));
+                       thermbal::toml_quoted(channel.place));
 }
 
 }  // namespace
@@ -62,11 +63,11 @@ std::string configuration_text(const NewConfiguration& wanted) {
         "period_s = 15.0              # one scan of all channels\n"
         "keep_measuring = false       # true: go on after the declaration, so that it can be checked\n"
         "start = \"{}\"             # \"manual\": thermbalctl start\n\n",
-        thermbal::quoted(wanted.test_name), thermbal::quoted(wanted.machine),
+        thermbal::toml_quoted(wanted.test_name), thermbal::toml_quoted(wanted.machine),
         wanted.start_automatically ? "auto" : "manual");
     text += fmt::format("[store]\npath = {}\n\n[service]\nsocket = {}\n\n[log]\nlevel = {}\n\n",
-                        thermbal::quoted(wanted.database), thermbal::quoted(wanted.socket),
-                        thermbal::quoted(wanted.log_level));
+                        thermbal::toml_quoted(wanted.database), thermbal::toml_quoted(wanted.socket),
+                        thermbal::toml_quoted(wanted.log_level));
     text += fmt::format(
         "[identification]\ntolerance_C = 0.2            # a channel is declared when its steady state is "
         "known "

@@ -23,10 +23,6 @@ namespace {
 
 using nlohmann::json;
 
-bool not_cancelled() {
-    return false;
-}
-
 json channels_json(const OfflineOptions& options, const std::vector<ChannelVerdict>& verdicts) {
     json list = json::array();
     for (const ChannelVerdict& verdict : verdicts) {

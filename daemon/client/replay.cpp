@@ -11,10 +11,6 @@
 namespace thermbal {
 namespace {
 
-bool not_cancelled() {
-    return false;
-}
-
 /// Of the channels that were not declared a person wants to see the curve too.
 void sweep_the_others(Replay& done, const OfflineInput& input, const Declarations& declarations,
                       const ParallelFor& parallel_for) {

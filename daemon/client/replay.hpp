@@ -12,6 +12,11 @@
 
 namespace thermbal {
 
+/// A command runs to its end; ctrl-C ends the program.
+inline bool not_cancelled() {
+    return false;
+}
+
 struct ReplayChange {
     double at_min = 0.0;
     DeclarationChange change;

@@ -17,6 +17,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/errno_text.hpp"
 #include "descriptor.hpp"
 
 namespace thermbal {
@@ -24,10 +25,6 @@ namespace thermbal {
 namespace {
 
 constexpr std::chrono::milliseconds grace{2000};
-
-std::string reason(int code) {
-    return std::generic_category().message(code);
-}
 
 void set_timer(int timer, std::chrono::milliseconds after) {
     itimerspec when{};
@@ -161,7 +158,7 @@ HookRunner::~HookRunner() = default;
 Result<HookRunner> HookRunner::create() {
     auto parts = std::make_unique<Parts>();
     parts->epoll = Descriptor(epoll_create1(EPOLL_CLOEXEC));
-    if (!parts->epoll.valid()) return fail(NextStep::retry, fmt::format("hooks: {}", reason(errno)));
+    if (!parts->epoll.valid()) return fail(NextStep::retry, fmt::format("hooks: {}", errno_text(errno)));
     return HookRunner(std::move(parts));
 }
 
@@ -171,12 +168,12 @@ Result<void> HookRunner::run(const Hook& hook, Done done) {
     Parts::Running running;
     running.done = std::move(done);
     running.timer = Descriptor(timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
-    if (!running.timer.valid()) return fail(NextStep::retry, fmt::format("hook: {}", reason(errno)));
+    if (!running.timer.valid()) return fail(NextStep::retry, fmt::format("hook: {}", errno_text(errno)));
     const int code = SpawnSettings().spawn(running.pid, hook.argv, environment_of(hook));
     if (code != 0) {
         const bool passing = code == EAGAIN || code == ENOMEM || code == EMFILE || code == ENFILE;
         return fail(passing ? NextStep::retry : NextStep::refuse_input,
-                    fmt::format("hook {}: cannot be started: {}", hook.argv.front(), reason(code)));
+                    fmt::format("hook {}: cannot be started: {}", hook.argv.front(), errno_text(code)));
     }
     running.process = Descriptor(static_cast<int>(syscall(SYS_pidfd_open, running.pid, 0)));
     set_timer(running.timer.get(), std::max(hook.timeout, std::chrono::milliseconds(1)));
@@ -185,7 +182,7 @@ Result<void> HookRunner::run(const Hook& hook, Done done) {
                          parts_->watch(running.timer.get(), id, Event::time_is_up);
     if (!watched)
         return fail(NextStep::stop, fmt::format("hook {}: runs, but cannot be watched: {}", hook.argv.front(),
-                                                reason(errno)));
+                                                errno_text(errno)));
     parts_->running.emplace(id, std::move(running));
     return {};
 }

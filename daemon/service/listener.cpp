@@ -12,13 +12,11 @@
 #include <sys/un.h>
 #include <systemd/sd-daemon.h>
 
+#include "base/errno_text.hpp"
+
 namespace thermbal {
 
 namespace {
-
-std::string reason(int code) {
-    return std::generic_category().message(code);
-}
 
 std::unexpected<Error> refuse(const std::filesystem::path& path, const std::string& what) {
     return fail(NextStep::refuse_input, fmt::format("socket {}: {}", path.string(), what));
@@ -40,7 +38,7 @@ Result<void> clear_stale(const std::filesystem::path& path) {
     struct stat file{};
     if (lstat(path.c_str(), &file) != 0) {
         if (errno == ENOENT) return {};
-        return refuse(path, reason(errno));
+        return refuse(path, errno_text(errno));
     }
     if (!S_ISSOCK(file.st_mode)) return refuse(path, "is there and is no socket; name another path");
     const auto address = address_of(path);
@@ -48,10 +46,10 @@ Result<void> clear_stale(const std::filesystem::path& path) {
     if (connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
         errno == EAGAIN)
         return refuse(path, "another daemon answers on it; stop that one, or name another path");
-    if (errno != ECONNREFUSED) return refuse(path, reason(errno));
+    if (errno != ECONNREFUSED) return refuse(path, errno_text(errno));
     if (unlink(path.c_str()) != 0 && errno != ENOENT)
         return refuse(path,
-                      fmt::format("left by a daemon that is gone, cannot be removed: {}", reason(errno)));
+                      fmt::format("left by a daemon that is gone, cannot be removed: {}", errno_text(errno)));
     return {};
 }
 
@@ -77,16 +75,16 @@ Result<Listener> Listener::bind_at(const std::filesystem::path& path, mode_t mod
                       fmt::format("a path of 1 to {} bytes is needed", sizeof(sockaddr_un::sun_path) - 1));
     if (auto cleared = clear_stale(path); !cleared) return std::unexpected(cleared.error());
     Listener listener(stream_socket());
-    if (!listener.socket_.valid()) return refuse(path, reason(errno));
+    if (!listener.socket_.valid()) return refuse(path, errno_text(errno));
     const auto address = address_of(path);
     if (bind(listener.fd(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-        return refuse(path, fmt::format("{}; the folder must exist and be writable", reason(errno)));
+        return refuse(path, fmt::format("{}; the folder must exist and be writable", errno_text(errno)));
     listener.path_ = path;
     listener.file_.emplace();
     // Nobody can connect before listen: the mode is right from the first moment on.
     if (lstat(path.c_str(), &*listener.file_) != 0 || chmod(path.c_str(), mode) != 0 ||
         listen(listener.fd(), 64) != 0)
-        return refuse(path, reason(errno));
+        return refuse(path, errno_text(errno));
     return listener;
 }
 

@@ -16,6 +16,7 @@
 #include <sys/timerfd.h>
 #include <unistd.h>
 
+#include "base/errno_text.hpp"
 #include "descriptor.hpp"
 #include "json_rpc.hpp"
 #include "listener.hpp"
@@ -404,14 +405,12 @@ Result<SocketServer> SocketServer::open(const SocketServerOptions& options) {
     event.events = EPOLLIN | EPOLLET;
     event.data.fd = listener->fd();
     if (!epoll.valid() || epoll_ctl(epoll.get(), EPOLL_CTL_ADD, listener->fd(), &event) != 0)
-        return fail(NextStep::stop, fmt::format("socket {}: {}", options.path.string(),
-                                                std::generic_category().message(errno)));
+        return fail(NextStep::stop, fmt::format("socket {}: {}", options.path.string(), errno_text(errno)));
     Descriptor timer(timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC));
     event.events = EPOLLIN;
     event.data.fd = timer.get();
     if (!timer.valid() || epoll_ctl(epoll.get(), EPOLL_CTL_ADD, timer.get(), &event) != 0)
-        return fail(NextStep::stop, fmt::format("socket {}: {}", options.path.string(),
-                                                std::generic_category().message(errno)));
+        return fail(NextStep::stop, fmt::format("socket {}: {}", options.path.string(), errno_text(errno)));
     Descriptor spare(::open("/dev/null", O_RDONLY | O_CLOEXEC));
     SocketServer server(std::unique_ptr<Parts>(new Parts{options,
                                                          std::move(*listener),

@@ -16,15 +16,12 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include "base/errno_text.hpp"
 #include "sqlite.hpp"
 
 namespace thermbal {
 
 namespace {
-
-std::string reason(int code) {
-    return std::generic_category().message(code);
-}
 
 std::string holder(int fd) {
     std::array<char, 32> text{};
@@ -51,7 +48,7 @@ Result<WriterLock> WriterLock::take(const std::filesystem::path& database) {
         return fail(
             NextStep::refuse_input,
             fmt::format("database {}: cannot open its lock {}: {}; the folder must exist and be writable",
-                        database.string(), path, reason(errno)));
+                        database.string(), path, errno_text(errno)));
     if (flock(lock.fd_, LOCK_EX | LOCK_NB) != 0)
         return fail(NextStep::refuse_input,
                     fmt::format("database {}: {} is writing it already; stop that one, or name another file",
@@ -73,7 +70,7 @@ Result<void> create_if_absent(const std::filesystem::path& database) {
     if (fd < 0)
         return fail(NextStep::refuse_input,
                     fmt::format("database {}: {}; the folder must exist and both must be writable",
-                                database.string(), reason(errno)));
+                                database.string(), errno_text(errno)));
     close(fd);
     sync_folder(database);
     return {};

@@ -14,7 +14,7 @@ Model another_machine() {
     Model model = small_machine();
     double factor = 0.82;
     for (Node& node : model.nodes) node.heat_capacity_J_per_K.value *= (factor += 0.07);
-    for (Link& link : model.links) link.conductance_W_per_K.value *= (factor += 0.05);
+    for (ThermalLink& link : model.links) link.conductance_W_per_K.value *= (factor += 0.05);
     model.sources[0].power_W.value *= 0.9;
     return model;
 }

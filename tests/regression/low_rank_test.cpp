@@ -55,7 +55,8 @@ TEST(VectorLoops, OuterProductsAddUpInTheLowerTriangle) {
     for (const Index length : {8, 16, 40}) {
         const MatrixXd vectors = MatrixXd::Random(length, 11);
         MatrixXd lower = MatrixXd::Ones(length, length);
-        vector_loops::add_outer_products(vectors.data(), static_cast<std::size_t>(length), 11, lower.data());
+        vector_loops::add_outer_products(vectors.data(), static_cast<std::size_t>(length), 11, 1.0,
+                                         lower.data());
         const MatrixXd expected = MatrixXd::Ones(length, length) + vectors * vectors.transpose();
         const MatrixXd off = (lower - expected).triangularView<Eigen::Lower>();
         EXPECT_LT(off.cwiseAbs().maxCoeff(), 1e-13);

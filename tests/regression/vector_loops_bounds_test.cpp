@@ -44,7 +44,7 @@ TEST(VectorLoops, ReadAndWriteNothingBeyondTheirArrays) {
     for (const std::size_t rows : {8, 16, 24, 40, 64, 128}) {
         for (const std::size_t count : {1, 2, 3, 4, 5, 7, 8, 13, 35, 90}) {
             AtTheEdge matrix(rows * count), square(rows * rows), column(rows), weight(rows), lags(count);
-            vector_loops::add_outer_products(matrix.data(), rows, count, square.data());
+            vector_loops::add_outer_products(matrix.data(), rows, count, 1.0, square.data());
             vector_loops::multiply_columns(matrix.data(), rows, count, lags.data(), 0.5, column.data());
             vector_loops::subtract_columns(matrix.data(), rows, count, lags.data(), column.data());
             std::vector<const double*> lagged;

@@ -6,6 +6,6 @@
 namespace thermbal {
 
 /// A string as TOML writes it, with its quotes.
-std::string quoted(std::string_view text);
+std::string toml_quoted(std::string_view text);
 
 }  // namespace thermbal

@@ -41,7 +41,7 @@ struct CalibratedParameter {
     double learned() const;
 };
 
-struct Calibration {
+struct ModelCalibration {
     Model model;  ///< fitted values; sigmas as far as the data went
     std::vector<CalibratedParameter> parameters;
     std::vector<std::string> channels;  ///< the columns of residual_C
@@ -59,7 +59,7 @@ struct Calibration {
 /// model, within the bounds; Levenberg-Marquardt with numerical sensitivities; the first readings count as
 /// uncertain by the sensor's noise. Errors: refuse_input when no sensor of the model is in the test or the
 /// model is not valid. Any thread.
-Result<Calibration> calibrate(const Model& model, const RecordedTest& test,
-                              const CalibrationOptions& options = {});
+Result<ModelCalibration> calibrate(const Model& model, const RecordedTest& test,
+                                   const CalibrationOptions& options = {});
 
 }  // namespace thermbal

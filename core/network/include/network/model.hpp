@@ -33,7 +33,7 @@ struct Node {
 };
 
 /// Heat flows from the warmer to the cooler end: conductance * difference.
-struct Link {
+struct ThermalLink {
     std::string a;
     std::string b;
     Uncertain conductance_W_per_K;
@@ -94,7 +94,7 @@ struct Model {
     Ambient ambient;
     double relative_sigma = 0.3;  ///< of every number that does not say itself
     std::vector<Node> nodes;
-    std::vector<Link> links;
+    std::vector<ThermalLink> links;
     std::vector<Source> sources;
     std::vector<Sensor> sensors;
     std::vector<Effect> effects;

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <cstddef>
-#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "regression/bending_gram.hpp"
 #include "regression/vector_loops.hpp"
 
 namespace thermbal {
@@ -61,8 +61,6 @@ class TubeSolver {
     void newton_direction();
     void direction_in_feature_space(double curvature);
     void direction_in_row_space(double curvature);
-    void bring_row_gram_up_to_date();
-    Eigen::Ref<Eigen::MatrixXd> square_of(const Eigen::MatrixXd& vectors, Eigen::Index length);
     double step_length();
     void centre_undetermined_bias();
 
@@ -75,15 +73,12 @@ class TubeSolver {
     State state_;
     Eigen::VectorXd residuals_;
     Eigen::VectorXd slopes_, new_slopes_;
-    Eigen::VectorXd slope_sum_;            ///< sum of slopes_(i) * row i
-    std::vector<Eigen::Index> bending_;    ///< rows where the loss is quadratic
-    Eigen::MatrixXd bent_;                 ///< their features, one column a row, padded with zeros
-    Eigen::MatrixXd by_feature_;           ///< bent_ transposed, padded likewise
-    Eigen::MatrixXd square_;               ///< of the Newton system
-    Eigen::MatrixXd row_gram_, new_gram_;  ///< of the rows `gram_rows_`, lower triangle
-    std::vector<Eigen::Index> gram_rows_;
-    std::vector<std::pair<Eigen::Index, Eigen::Index>> kept_;  ///< place among bending_, and among gram_rows_
-    std::vector<Eigen::Index> fresh_;                          ///< places among bending_
+    Eigen::VectorXd slope_sum_;          ///< sum of slopes_(i) * row i
+    std::vector<Eigen::Index> bending_;  ///< rows where the loss is quadratic
+    FeatureGram feature_gram_;
+    RowGram row_gram_;
+    Eigen::MatrixXd bent_;    ///< the features of the bending rows, one column a row
+    Eigen::MatrixXd system_;  ///< of the Newton step
     Eigen::VectorXd gradient_;
     double bias_gradient_ = 0.0;
     Eigen::VectorXd direction_;

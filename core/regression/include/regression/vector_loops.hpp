@@ -33,10 +33,11 @@ void scaled_exp(double* values, std::size_t count, double factor);
 double weighted_gaussians(const double* centres, std::size_t count, const double* weight, const double* point,
                           std::size_t lags, double factor);
 
-/// lower += sum over c < count of v_c v_c', v_c = vectors[c * length ...]: the lower triangle of a length x
-/// length matrix, column by column; of what lies above, a part is written, too.
-/// REQUIRES: length % lane_count == 0.
-void add_outer_products(const double* vectors, std::size_t length, std::size_t count, double* lower);
+/// lower += sign * sum over c < count of v_c v_c', v_c = vectors[c * length ...]: the lower triangle of a
+/// length x length matrix, column by column; of what lies above, a part is written, too. REQUIRES: length %
+/// lane_count == 0.
+void add_outer_products(const double* vectors, std::size_t length, std::size_t count, double sign,
+                        double* lower);
 
 /// The epsilon-insensitive loss with its kink smoothed over `smoothing`: its slope is
 /// C * clamp((|residual| - epsilon) / smoothing, 0, 1), with the sign of the residual.
