@@ -1,6 +1,7 @@
 #include "calibrate_command.hpp"
 
 #include <cmath>
+#include <optional>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -11,6 +12,7 @@
 #include "gap/calibrate.hpp"
 #include "model_input.hpp"
 #include "output.hpp"
+#include "progress.hpp"
 #include "report/verdict_json.hpp"
 
 namespace thermbal {
@@ -128,7 +130,9 @@ int run_calibrate(const CalibrateCommand& command) {
     if (!model) return report_error(model.error());
     const auto test = read_recorded_test(command.file);
     if (!test) return report_error(test.error());
+    std::optional<Progress> progress("calibrate");
     const auto calibration = calibrate(*model, *test);
+    progress.reset();
     if (!calibration) {
         return report_error(
             {calibration.error().next,

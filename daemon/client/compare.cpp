@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -14,6 +15,7 @@
 #include "files.hpp"
 #include "offline_input.hpp"
 #include "output.hpp"
+#include "progress.hpp"
 #include "report/verdict_json.hpp"
 #include "series/sample.hpp"
 
@@ -95,7 +97,7 @@ class Comparison {
           channels_(wanted_channels(options.recording, input_)),
           end_(end_of_recording(input_.window, channels_, input_.flow)) {}
 
-    json run() {
+    json run(Progress& progress) {
         json document = head();
         const ParallelFor parallel_for = parallel_on_threads(options_.recording.threads, false);
         const double end_min = input_.window.end_s() / 60.0;
@@ -105,6 +107,8 @@ class Comparison {
             const TestWindow window = window_until(input_.window, (first_min + k * step_min) * 60.0);
             add(document["channels"],
                 compare_estimators(window, estimators_, channels_, input_.flow, parallel_for));
+            // The work of a window grows with its length, so all windows up to here go with its square.
+            progress.set(std::pow(k * step_min / (end_min - first_min), 2.0));
         }
         document["summary"] = comparison_summary(document);
         return document;
@@ -187,7 +191,9 @@ int run_compare(const CompareOptions& options) {
     if (!input) return report_error(input.error());
     auto estimators = chosen_estimators(options, input->flow.prior.has_value());
     if (!estimators) return report_error(estimators.error());
-    const json document = Comparison(options, std::move(*input), std::move(*estimators)).run();
+    std::optional<Progress> progress("compare");
+    const json document = Comparison(options, std::move(*input), std::move(*estimators)).run(*progress);
+    progress.reset();
     if (!options.plot.empty()) {
         if (const auto drawn = draw(document, options.plot); !drawn) return report_error(drawn.error());
     }

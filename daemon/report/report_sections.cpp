@@ -359,7 +359,7 @@ std::string events_section(const TestReport& report) {
     if (report.has_older_events)
         html += fmt::format("<p>The newest {}; older ones are in the database.</p>", report.events.size());
     html +=
-        R"(<div class="scroll"><table><thead><tr><th class="number">min</th><th class="wide">what</th><th>channel</th><th></th></tr></thead><tbody>)";
+        R"(<div class="scroll"><table class="events"><thead><tr><th class="number">min</th><th class="wide">what</th><th>channel</th><th></th></tr></thead><tbody>)";
     for (const ReportEvent& event : report.events) {
         std::string kind = event.kind;
         std::ranges::replace(kind, '_', ' ');

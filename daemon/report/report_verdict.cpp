@@ -53,16 +53,16 @@ const ReportChannel* warmest(const TestReport& report) {
 
 std::string facts(const TestReport& report, const TestAnswer& answer) {
     std::string html = "<div class=\"facts\">";
-    html += fact(
-        duration(answer.balance_min),
-        fmt::format("thermal balance: 95 % of the rise of {}, 90 % sure of {} to {}", escaped(answer.slowest),
-                    duration(answer.balance_low_min), duration(answer.balance_high_min)));
+    html += fact(duration(answer.balance_min),
+                 fmt::format("thermal balance: 95&nbsp;% of the rise of {}, 90&nbsp;% sure of {} to {}",
+                             escaped(answer.slowest), duration(answer.balance_low_min),
+                             duration(answer.balance_high_min)));
     html += fact(duration(answer.known_min), "measured until this was known and proved");
     if (answer.saved_min() > 0)
         html += fact(fmt::format("{:.1f} h", answer.saved_min() / 60.0),
-                     "saved against waiting for 95 % of the rise");
+                     "saved against waiting for 95&nbsp;% of the rise");
     html += fact(fmt::format("&plusmn;{:.2f} &deg;C", answer.widest_half_C),
-                 "widest 90 % interval of a declared temperature");
+                 "widest 90&nbsp;% interval of a declared temperature");
     if (const ReportChannel* const channel = warmest(report))
         html += fact(degrees(channel->verdict->steady_state_C, 1) + " &deg;C",
                      fmt::format("warmest: {} {}", escaped(channel->name), escaped(channel->place)));

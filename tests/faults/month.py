@@ -4,7 +4,7 @@ WAL and database over the time, as figures and as a plot.
 
     THERMBAL_BIN_DIR=build/release/bin THERMBAL_SOURCE_DIR=. tests/faults/month.py [--days 30] [--plot month.svg]
 
-A scan that is due every 15 s is due every 15 s / --speed here (0.15 s; 30 days take 7.2 h). Ends with 1 when a value that is
+A scan that is due every 15 s is due every 15 s / --speed here (0.25 s; 30 days take 12 h). Ends with 1 when a value that is
 stored as good is none that the module measured during that scan, a scan has no row, or something has grown that should not.
 """
 import argparse
@@ -144,7 +144,7 @@ def plot(path, seen):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--days", type=float, default=30.0)
-    parser.add_argument("--speed", type=float, default=100.0, help="15 s of the month in 15 s / SPEED")
+    parser.add_argument("--speed", type=float, default=60.0, help="15 s of the month in 15 s / SPEED")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--plot", default="month.svg")
     parser.add_argument("--library", default=str(BIN.parent / "tests" / "libclock_step.so"), help=argparse.SUPPRESS)

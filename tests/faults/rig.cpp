@@ -122,9 +122,9 @@ EndpointState Rig::look(std::int64_t now_ns) {
     const std::lock_guard lock(mutex_);
     const EndpointState now = station_.endpoint(now_ns);
     const bool planned = !station_.plan().faults().empty();
-    if (!planned && seen_ == EndpointState{} &&
+    if (!planned && seen_ == EndpointState{} && !server_->busy() &&
         disturbed_until_ns_ == std::numeric_limits<std::int64_t>::max()) {
-        disturbed_until_ns_ = std::max(effect_until_ns_, now_ns) + soon_ns;
+        disturbed_until_ns_ = now_ns + soon_ns;
     }
     seen_ = now;
     return now;
@@ -143,11 +143,7 @@ std::vector<Delivery> Rig::answer(Framing framing, const ModbusRequest& request,
     const std::int64_t turnaround_ns = std::uniform_int_distribution(0, 2'000'000)(turnaround_);
     busy_until_ns_ = std::max(busy_until_ns_, now_ns) + turnaround_ns;
     const double answered_after_s = static_cast<double>(busy_until_ns_ - now_ns) * 1e-9;
-    double last_s = 0.0;
-    for (Delivery& delivery : sent) last_s = std::max(last_s, delivery.delay_s += answered_after_s);
-    if (!station_.plan().faults().empty()) {
-        effect_until_ns_ = std::max(effect_until_ns_, now_ns + static_cast<std::int64_t>(last_s * 1e9));
-    }
+    for (Delivery& delivery : sent) delivery.delay_s += answered_after_s;
     return sent;
 }
 

@@ -73,11 +73,10 @@ class Rig {
     std::atomic<std::int64_t> looked_ns_;
     std::atomic<std::int64_t> worst_pause_ns_ = 0;  ///< between two looks
     mutable std::mutex mutex_;
-    Station station_;                   // guarded by mutex_
-    std::mt19937_64 turnaround_;        // server thread
-    std::int64_t busy_until_ns_ = 0;    // server thread: when the newest request is answered
-    EndpointState seen_;                // server thread: at the look before
-    std::int64_t effect_until_ns_ = 0;  // server thread: when the last reply under a fault goes out
+    Station station_;                 // guarded by mutex_
+    std::mt19937_64 turnaround_;      // server thread
+    std::int64_t busy_until_ns_ = 0;  // server thread: when the newest request is answered
+    EndpointState seen_;              // server thread: at the look before
     std::unique_ptr<Server> server_;
     int port_ = 0;
     std::string folder_;
