@@ -146,7 +146,7 @@ def publishes_in_the_sandbox(box):
     box.run("apt-get install -y -qq --no-install-recommends mosquitto mosquitto-clients && systemctl start mosquitto", seconds=600)
     # No comment of the installed configuration is touched: the section is added.
     box.run(f"printf '\\n[mqtt]\\nhost = \"127.0.0.1\"\\nport = 1883\\n' >> {CONFIG} && systemctl start thermbal-mqtt")
-    heard = json.loads(box.run("mosquitto_sub -t 'thermbal/+/samples' -C 1 -W 60"))
+    heard = json.loads(box.run("mosquitto_sub -h 127.0.0.1 -t 'thermbal/+/samples' -C 1 -W 60"))
     assert heard["samples"]["T1"]["quality"] == "good", heard
     assert box.run("systemctl is-active thermbal-mqtt").strip() == "active"
     say(f"ok   thermbal-mqtt in the same sandbox sends to a broker: scan {heard['scan']} came")
