@@ -166,9 +166,13 @@ IdentificationRecord identification_in(const sqlite::Statement& row) {
     return {row.text(0), row.integer(1), row.integer(2), row.text(3)};
 }
 
-bool on_read_only_medium(const std::filesystem::path& path) {
+/// Nobody can write there, and nothing has: without its shared memory a WAL cannot be read, and there is
+/// nothing in it. With it, the medium may be read-only for us alone (a sandbox), and a daemon writes.
+bool cannot_change(const std::filesystem::path& path) {
     struct statvfs medium{};
-    return statvfs(path.c_str(), &medium) == 0 && (medium.f_flag & ST_RDONLY) != 0;
+    std::error_code error;
+    return statvfs(path.c_str(), &medium) == 0 && (medium.f_flag & ST_RDONLY) != 0 &&
+           !std::filesystem::exists(path.string() + "-shm", error);
 }
 
 }  // namespace
@@ -182,9 +186,7 @@ Result<Reader> Reader::open(const std::filesystem::path& path) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(path, error))
         return fail(NextStep::refuse_input, fmt::format("database {}: no such file", path.string()));
-    // On a medium that nobody can write, a WAL cannot be shared, and nothing can change under us.
-    const auto mode =
-        on_read_only_medium(path) ? sqlite::OpenMode::read_only_medium : sqlite::OpenMode::read_only;
+    const auto mode = cannot_change(path) ? sqlite::OpenMode::read_only_medium : sqlite::OpenMode::read_only;
     auto database = sqlite::Database::open(path, mode, 2000);
     if (!database) return std::unexpected(database.error());
     if (auto ours = check_schema(**database, false); !ours) return std::unexpected(ours.error());

@@ -6,6 +6,8 @@
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
+#include <sched.h>
+#include <sys/mount.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -293,6 +295,42 @@ TEST_F(OpeningTest, OtherProgramsReadIt) {
         EXPECT_EQ(output_of("/usr/bin/sqlite3 -readonly " + path.string() + " \"" + sql + "\""),
                   "T5|4|18.403\n");
     }
+}
+
+/// What systemd's ProtectSystem=strict makes of a folder for one process.
+bool make_read_only_for_this_process(const std::filesystem::path& folder) {
+    return unshare(CLONE_NEWNS) == 0 && mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+           mount(folder.c_str(), folder.c_str(), nullptr, MS_BIND, nullptr) == 0 &&
+           mount("none", folder.c_str(), nullptr, MS_REMOUNT | MS_BIND | MS_RDONLY, nullptr) == 0;
+}
+
+TEST_F(OpeningTest, AReaderInASandboxSeesWhatTheDaemonWrites) {
+    if (geteuid() != 0) GTEST_SKIP() << "needs root to mount";
+    auto store = open_store(path);
+    std::array<int, 2> told{};
+    std::array<int, 2> asked{};
+    ASSERT_EQ(pipe(told.data()), 0);
+    ASSERT_EQ(pipe(asked.data()), 0);
+    const pid_t child = fork();
+    char byte = 0;
+    if (child == 0) {
+        if (!make_read_only_for_this_process(path.parent_path())) _exit(77);
+        const auto reader = Reader::open(path);
+        if (!reader || !reader->tests()->empty() || write(told[1], "r", 1) != 1) _exit(1);
+        if (read(asked[0], &byte, 1) != 1) _exit(1);
+        _exit(reader->tests()->size() == 1 ? 0 : 2);
+    }
+    close(told[1]);
+    const bool reads = read(told[0], &byte, 1) == 1;
+    if (reads) {
+        ASSERT_OK(store.begin_test(test_record()));
+        ASSERT_EQ(write(asked[1], "w", 1), 1);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    for (const int fd : {told[0], asked[0], asked[1]}) close(fd);
+    if (WEXITSTATUS(status) == 77) GTEST_SKIP() << "may not mount here";
+    EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 TEST_F(OpeningTest, AnotherUserReadsItWithAndWithoutTheDaemon) {
