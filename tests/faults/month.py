@@ -128,7 +128,7 @@ def plot(path, seen):
     parts = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{width + left + 20}" height="{4 * height + 40}" '
              'font-family="sans-serif" font-size="11">', '<rect width="100%" height="100%" fill="white"/>']
     days = max(one["day"] for one in seen)
-    step = max(1, len(seen) // 1500)
+    step = max(1, len(seen) // 500)
     for number, (key, name) in enumerate((("memory_MiB", "memory, MiB"), ("descriptors", "descriptors"),
                                           ("wal_MiB", "WAL, MiB"), ("database_MiB", "database, MiB"))):
         top, most = number * height + 15, max(max(one[key] for one in seen), 1e-9)
