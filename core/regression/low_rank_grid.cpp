@@ -17,8 +17,25 @@ namespace {
 
 using Eigen::VectorXd;
 
+constexpr TubeSolver::Schedule wide{
+    .first_smoothing = 0.5, .factor = 0.1, .last_smoothing = 1e-3, .most_steps = 1000};
 constexpr TubeSolver::Schedule exact{
-    .first_smoothing = 0.5, .factor = 0.1, .last_smoothing = 1e-8, .most_steps = 1000};
+    .first_smoothing = 1e-3, .factor = 0.1, .last_smoothing = 1e-8, .most_steps = 1000};
+constexpr double wide_tolerance_factor = 1000.0;
+constexpr double exact_tolerance_factor = 0.01;
+
+/// Where a fit on `kernel` may start from. While the smoothing is wide most rows bend, and a step costs the
+/// square of the features: that much is done on fewer of them. The optimum is the same from wherever one
+/// comes.
+TubeSolver::State near_the_optimum(const LagProblem& problem, const KernelFeatures& kernel,
+                                   const VectorXd& targets, double C, double sigma, double epsilon) {
+    const KernelFeatures few =
+        kernel_features(problem, sigma, wide_tolerance_factor * feature_tolerance(sigma));
+    TubeSolver solver(few.features, targets, epsilon);
+    static_cast<void>(solver.fit(C, solver.cold_start(), wide));
+    const TubeSolver::State& found = solver.state();
+    return {weights_of(kernel, few.pivots, pivot_coefficients(few, found.weights)), found.bias};
+}
 
 /// One search of the grid. What has been found so far is what every further point is measured against.
 class GridSearch {
@@ -120,11 +137,13 @@ Result<std::vector<double>> cross_validate_low_rank(const LagProblem& problem, c
 
 Result<SvrModel> fit_model_low_rank(const LagProblem& problem, double C, double sigma,
                                     const SweepOptions& options) {
-    const KernelFeatures kernel = kernel_features(problem, sigma, 0.01 * feature_tolerance(sigma));
+    const KernelFeatures kernel =
+        kernel_features(problem, sigma, exact_tolerance_factor * feature_tolerance(sigma));
     const Eigen::Map<const VectorXd> targets(problem.targets().data(),
                                              static_cast<Eigen::Index>(problem.rows()));
     TubeSolver solver(kernel.features, targets, options.epsilon);
-    if (!solver.fit(C, solver.cold_start(), exact)) {
+    const TubeSolver::State start = near_the_optimum(problem, kernel, targets, C, sigma, options.epsilon);
+    if (!solver.fit(C, start, exact)) {
         return fail(NextStep::stop,
                     fmt::format("the fit at n = {}, C = {}, sigma = {} did not come to an end", problem.lags,
                                 C, sigma));
