@@ -6,6 +6,7 @@
 #include "fit.hpp"
 #include "linearisation.hpp"
 #include "network/effect.hpp"
+#include "residual_timing.hpp"
 
 namespace thermbal {
 
@@ -30,8 +31,7 @@ struct Screened {
 };
 
 /// Tries the candidate with its shape (onset, period, decay ...) on a grid, its size solved for at each.
-/// `periods_s`: what the residual itself repeats with.
-Screened screen(const Candidate& candidate, const ScreeningGround& ground,
-                const std::vector<double>& periods_s);
+/// `timing`: what the residual itself says of when.
+Screened screen(const Candidate& candidate, const ScreeningGround& ground, const ResidualTiming& timing);
 
 }  // namespace thermbal

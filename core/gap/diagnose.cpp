@@ -7,6 +7,7 @@
 #include "comparison.hpp"
 #include "describe.hpp"
 #include "disagreement.hpp"
+#include "fidelity.hpp"
 #include "search.hpp"
 
 namespace thermbal {
@@ -77,6 +78,23 @@ Result<void> compare_runs(const Evidence& evidence, const RecordedTest& test,
     return {};
 }
 
+/// Calibrates and searches; where what was found leaves the channels wandering further than was allowed for,
+/// once more with that allowed for. Leaves in `evidence` what was.
+Result<SearchResult> search_at_fidelity_seen(Evidence& evidence, const DiagnoseOptions& options) {
+    constexpr int most_rounds = 3;
+    constexpr double worth_another = 1.4;
+    for (int round = 1;; ++round) {
+        auto calibrated = explain(evidence, {}, nullptr);
+        if (!calibrated) return std::unexpected(calibrated.error());
+        auto search = search_effects(evidence, std::move(*calibrated), options);
+        if (!search || round == most_rounds) return search;
+        const ModelFidelity& fidelity = evidence.calibration.fidelity;
+        const double seen = share_of_rise_seen(evidence.run, search->current.fit.point, fidelity);
+        if (seen < worth_another * fidelity.share_of_rise) return search;
+        allow_for(evidence, seen);
+    }
+}
+
 /// The models that a file can hold: a sensor has no place of its own in its node there, so that the model's
 /// own numbers have to describe what that place did in the search.
 struct WrittenModels {
@@ -86,6 +104,10 @@ struct WrittenModels {
 Result<WrittenModels> as_written(const Evidence& evidence, const SearchResult& search) {
     Evidence without_places = evidence;
     without_places.run.place_sigma = 1e-6;
+    // A search has to be careful with what it calls a disagreement; numbers are the better the nearer the
+    // wander is to what is seen.
+    allow_for(without_places,
+              share_of_rise_seen(evidence.run, search.current.fit.point, evidence.calibration.fidelity));
     auto calibrated = polish(without_places, search.base);
     if (!calibrated) return std::unexpected(calibrated.error());
     if (search.steps.empty()) return WrittenModels{calibrated->fit.model, calibrated->fit.model};
@@ -119,13 +141,10 @@ std::string_view to_string(GapVerdict verdict) {
 
 Result<Diagnosis> diagnose(const Model& model, const RecordedTest& test, std::span<const Holdout> holdouts,
                            const DiagnoseOptions& options, const ParallelFor& parallel_for) {
-    const auto evidence = gather(model, test, holdouts, options, parallel_for);
+    auto evidence = gather(model, test, holdouts, options, parallel_for);
     if (!evidence) return std::unexpected(evidence.error());
 
-    auto calibrated = explain(*evidence, {}, nullptr);
-    if (!calibrated) return std::unexpected(calibrated.error());
-
-    const auto search = search_effects(*evidence, std::move(*calibrated), options);
+    const auto search = search_at_fidelity_seen(*evidence, options);
     if (!search) return std::unexpected(search.error());
 
     auto written = as_written(*evidence, *search);
@@ -140,10 +159,10 @@ Result<Diagnosis> diagnose(const Model& model, const RecordedTest& test, std::sp
     diagnosis.extended = extended_model(written->extended, diagnosis.effects, model.effects.size());
     diagnosis.suspects = suspects_of(search->left, options.probability_to_list);
     diagnosis.reason = reason_of(*search, diagnosis);
-    diagnosis.share_of_rise = options.calibration.fidelity.share_of_rise;
+    diagnosis.share_of_rise = evidence->calibration.fidelity.share_of_rise;
     if (diagnosis.verdict != GapVerdict::agrees) {
         diagnosis.disagreements =
-            disagreements_of(evidence->run, search->base.fit.point, options.calibration.fidelity);
+            disagreements_of(evidence->run, search->base.fit.point, evidence->calibration.fidelity);
         diagnosis.residual_heat = residual_heat_of(evidence->run, model, search->first_survey.nameless, 4);
     }
     if (auto done = compare_runs(*evidence, test, holdouts, options, diagnosis); !done)

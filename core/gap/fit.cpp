@@ -42,29 +42,62 @@ Eigen::VectorXd damped_step(const Eigen::MatrixXd& hessian, const Eigen::VectorX
     return step;
 }
 
-/// Sensitivities of all coordinates that `known` does not hold.
-Result<Eigen::MatrixXd> jacobian_at(const FitProblem& problem, const FitPoint& point, const FitStart& start) {
-    Eigen::MatrixXd jacobian(point.residual.size(), problem.dimensions());
-    const auto base = start.known_jacobian == nullptr ? 0 : start.known_jacobian->cols();
-    const Eigen::Index nuisances = problem.data().nuisances();
-    const Eigen::Index effects = problem.dimensions() - nuisances;
-    const Eigen::Index samples = point.residual.size() - problem.dimensions();
-    for (Eigen::Index i = 0; i < problem.dimensions(); ++i) {
+/// J'J in half the work.
+Eigen::MatrixXd gram(const Eigen::MatrixXd& jacobian) {
+    Eigen::MatrixXd product = Eigen::MatrixXd::Zero(jacobian.cols(), jacobian.cols());
+    product.selfadjointView<Eigen::Lower>().rankUpdate(jacobian.transpose());
+    return product.selfadjointView<Eigen::Lower>();
+}
+
+/// The Jacobian of a fit and what follows from it. Sensitivities that are known from a fit nearby are taken
+/// as they are; the rest follows the point.
+class Slope {
+  public:
+    Slope(const FitProblem& problem, const FitStart& start) : problem_(problem) {
+        const Eigen::Index size = problem.dimensions(), nuisances = problem.data().nuisances();
+        const Eigen::Index samples = problem.data().seen.reading_C.size();
+        jacobian_ = Eigen::MatrixXd::Zero(samples + size, size);
         // A known Jacobian has the parameters of the smaller model, then the nuisances; its rows end with as
         // many priors.
-        const Eigen::Index twin = i >= effects ? base - nuisances + (i - effects) : i;
-        if (start.known_jacobian != nullptr && (i >= effects || i < base - nuisances)) {
-            jacobian.col(i).setZero();
-            jacobian.col(i).head(samples) = start.known_jacobian->col(twin).head(samples);
-            jacobian(samples + i, i) = (*start.known_jacobian)(samples + twin, twin);
-            continue;
+        const auto known = start.known_jacobian == nullptr ? 0 : start.known_jacobian->cols() - nuisances;
+        const Eigen::Index numbers = size - nuisances;
+        for (Eigen::Index i = 0; i < size; ++i) {
+            if (start.known_jacobian == nullptr || (i >= known && i < numbers)) {
+                moving_.push_back(i);
+                continue;
+            }
+            const Eigen::Index twin = i < known ? i : known + i - numbers;
+            jacobian_.col(i).head(samples) = start.known_jacobian->col(twin).head(samples);
+            jacobian_(samples + i, i) = (*start.known_jacobian)(samples + twin, twin);
         }
-        auto column = problem.sensitivity(point, i);
-        if (!column) return std::unexpected(column.error());
-        jacobian.col(i) = *column;
+        hessian_ = gram(jacobian_);
     }
-    return jacobian;
-}
+
+    Result<void> follow(const FitPoint& point) {
+        for (const Eigen::Index i : moving_) {
+            auto column = problem_.sensitivity(point, i);
+            if (!column) return std::unexpected(column.error());
+            jacobian_.col(i) = *column;
+        }
+        if (static_cast<Eigen::Index>(moving_.size()) == jacobian_.cols()) {
+            hessian_ = gram(jacobian_);
+            return {};
+        }
+        for (const Eigen::Index i : moving_) {
+            hessian_.col(i).noalias() = jacobian_.transpose() * jacobian_.col(i);
+            hessian_.row(i) = hessian_.col(i).transpose();
+        }
+        return {};
+    }
+
+    const Eigen::MatrixXd& jacobian() const { return jacobian_; }
+    const Eigen::MatrixXd& hessian() const { return hessian_; }
+
+  private:
+    const FitProblem& problem_;
+    std::vector<Eigen::Index> moving_;
+    Eigen::MatrixXd jacobian_, hessian_;
+};
 
 }  // namespace
 
@@ -74,18 +107,16 @@ Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const Cal
     if (!first) return std::unexpected(first.error());
     Fit fit{{}, problem.parameters(), std::move(*first), {}, 0, false};
     double damping = 1e-3;
-    auto jacobian = jacobian_at(problem, fit.point, start);
-    if (!jacobian) return std::unexpected(jacobian.error());
-    fit.jacobian = std::move(*jacobian);
+    Slope slope(problem, start);
+    if (auto done = slope.follow(fit.point); !done) return std::unexpected(done.error());
     while (fit.iterations < options.max_iterations && !fit.converged) {
         ++fit.iterations;
-        const Eigen::MatrixXd hessian = fit.hessian();
-        const Eigen::VectorXd gradient = fit.jacobian.transpose() * fit.point.residual;
+        const Eigen::VectorXd gradient = slope.jacobian().transpose() * fit.point.residual;
         bool better = false;
         for (int attempt = 0; attempt < 8 && !better; ++attempt) {
             const Eigen::VectorXd step =
-                damped_step(hessian, gradient, fit.point.coordinates, lower, upper, damping);
-            const double promised = -step.dot(2.0 * gradient + hessian * step);
+                damped_step(slope.hessian(), gradient, fit.point.coordinates, lower, upper, damping);
+            const double promised = -step.dot(2.0 * gradient + slope.hessian() * step);
             auto next = problem.evaluate(fit.point.coordinates + step);
             if (next && next->chi2 < fit.point.chi2) {
                 better = true;
@@ -93,21 +124,16 @@ Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const Cal
                 fit.point = std::move(*next);
                 damping = std::max(damping * 0.1, 1e-9);
             } else if (promised < options.chi2_tolerance) {
-                fit.converged = true;
                 break;
             } else {
                 damping = std::max(damping, 1e-4) * 8.0;
             }
         }
-        if (!better) {
-            fit.converged = true;
-            break;
-        }
+        fit.converged = fit.converged || !better;
         if (fit.converged) break;
-        jacobian = jacobian_at(problem, fit.point, start);
-        if (!jacobian) return std::unexpected(jacobian.error());
-        fit.jacobian = std::move(*jacobian);
+        if (auto done = slope.follow(fit.point); !done) return std::unexpected(done.error());
     }
+    fit.jacobian = slope.jacobian();
     fit.model = problem.model_at(fit.point.coordinates);
     return fit;
 }

@@ -1,5 +1,7 @@
 #include "ground.hpp"
 
+#include "pooling.hpp"
+
 namespace thermbal {
 
 using Eigen::Index;
@@ -7,14 +9,16 @@ using Eigen::Index;
 ScreeningGround::ScreeningGround(const Evidence& evidence, const Explanation& current)
     : evidence_(&evidence), current_(&current) {
     const Index samples = current.fit.point.simulated_C.size();
-    runs_.push_back(
-        {FitProblem(evidence.run, current.fit.model), current.fit, current.fit.jacobian.topRows(samples)});
+    const Eigen::MatrixXd here = current.fit.jacobian.topRows(samples);
+    runs_.push_back({FitProblem(evidence.run, current.fit.model), current.fit,
+                     pooled(here, current.fit.point.simulated_C.rows())});
     for (const FitData& holdout : evidence.holdouts) {
         auto there = forecast(holdout, evidence, current);
         if (!there) continue;
         Fit fit{current.fit.model, {}, std::move(there->point), {}, 0, true};
+        const Index rows = fit.point.simulated_C.rows();
         runs_.push_back(
-            {FitProblem(holdout, current.fit.model), std::move(fit), std::move(there->sensitivity)});
+            {FitProblem(holdout, current.fit.model), std::move(fit), pooled(there->sensitivity, rows)});
     }
     stack();
     linearisation_.emplace(stacked_);
@@ -36,7 +40,9 @@ void ScreeningGround::stack() {
     for (std::size_t k = 0; k < runs_.size(); ++k) {
         const Run& run = runs_[k];
         const Index samples = run.sensitivity.rows();
-        stacked_.point.residual.segment(row, samples) = run.fit.point.residual.head(samples);
+        const Index readings = run.fit.point.simulated_C.size();
+        stacked_.point.residual.segment(row, samples) =
+            pooled(run.fit.point.residual.head(readings), run.fit.point.simulated_C.rows());
         if (k == 0) {
             stacked_.jacobian.block(0, 0, samples, own) = run.sensitivity;
         } else {
@@ -66,8 +72,9 @@ Result<Eigen::VectorXd> ScreeningGround::change_by(const Effect& effect) const {
     for (const Run& run : runs_) {
         const auto here = run.problem.change_by(run.fit, effect);
         if (!here) return std::unexpected(here.error());
-        change.segment(row, here->size()) = *here;
-        row += here->size();
+        const Eigen::VectorXd some = pooled(*here, run.fit.point.simulated_C.rows());
+        change.segment(row, some.size()) = some;
+        row += some.size();
     }
     return change;
 }

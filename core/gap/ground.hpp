@@ -7,7 +7,8 @@
 namespace thermbal {
 
 /// Where candidates are screened: the run together with the held-out runs, linear around one explanation.
-/// Nothing is fitted to the held-out runs; they only say which candidates are worth fitting to the run.
+/// Readings are pooled over three bins. Nothing is fitted to the held-out runs; they only say which
+/// candidates are worth fitting to the run.
 class ScreeningGround {
   public:
     /// Both outlive it. A held-out run that cannot be simulated is left out.

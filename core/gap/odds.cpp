@@ -14,6 +14,23 @@ double log_prior(const Candidate& candidate, const Model& model, const OddsOptio
     return std::log(options.catalogue / kinds / forms / places);
 }
 
+double evidence_at(const Survey& survey, bool of_sensor, const std::string& at) {
+    const auto found = std::ranges::find_if(
+        survey.nameless, [&](const Nameless& one) { return one.of_sensor == of_sensor && one.at == at; });
+    return found == survey.nameless.end() ? 0.0 : found->log_bayes_factor;
+}
+
+/// Sensor or machine: heat of any course in a node also shows at the neighbours, an error of any course of
+/// its sensor shows nowhere else. By how much the first describes better what is seen, a name for the sensor
+/// has to be better than others.
+double doubt_of_sensor(const Contender& contender, const Survey& survey, const Model& model) {
+    if (contender.candidate.form->site != EffectSite::channel) return 0.0;
+    const auto sensor = find_sensor(model, contender.candidate.at);
+    if (!sensor) return 0.0;
+    const double machine = evidence_at(survey, false, model.sensors[*sensor].node);
+    return std::max(0.0, machine - evidence_at(survey, true, contender.candidate.at));
+}
+
 /// Something without a name forecasts nothing, but a name must not win by forecasting roughly right what it
 /// does not describe well: on the run itself it has to be as good as the nameless. So the nameless gets what
 /// the best forecast gains.
@@ -31,7 +48,8 @@ Odds odds_of(const Survey& survey, const Model& model, const OddsOptions& option
     double largest = std::log(options.nothing_missing);
     std::vector<double> named, nameless;
     for (const Contender& contender : survey.contenders) {
-        named.push_back(contender.log_bayes_factor + log_prior(contender.candidate, model, options));
+        named.push_back(contender.log_bayes_factor + log_prior(contender.candidate, model, options) -
+                        doubt_of_sensor(contender, survey, model));
         largest = std::max(largest, named.back());
     }
     const double credit = forecast_credit(survey);

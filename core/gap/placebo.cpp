@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 
 #include "network/effect.hpp"
+#include "pooling.hpp"
 
 namespace thermbal {
 namespace {
@@ -85,7 +86,7 @@ Eigen::MatrixXd heat_responses(const std::string& node, const FitProblem& proble
         }
         responses.col(k) = data.whitening(one);
     }
-    return responses;
+    return pooled(responses, one.rows());
 }
 
 Eigen::MatrixXd sensor_responses(Eigen::Index column, const FitProblem& problem, const Hats& hat) {
@@ -100,7 +101,7 @@ Eigen::MatrixXd sensor_responses(Eigen::Index column, const FitProblem& problem,
         }
         responses.col(k) = data.whitening(one);
     }
-    return responses;
+    return pooled(responses, data.seen.reading_C.rows());
 }
 
 Eigen::MatrixXd smooth_covariance(const Hats& hat, double size, double smoothness_s) {
@@ -113,6 +114,19 @@ Eigen::MatrixXd smooth_covariance(const Hats& hat, double size, double smoothnes
         }
     }
     return covariance;
+}
+
+/// The same fit, its readings pooled.
+Fit with_pooled_readings(const Fit& fit) {
+    const Eigen::Index rows = fit.point.simulated_C.rows(), readings = fit.point.simulated_C.size();
+    const Eigen::Index priors = fit.jacobian.cols();
+    const Eigen::MatrixXd some = pooled(fit.jacobian.topRows(readings), rows);
+    Fit result{fit.model, fit.parameters, {}, {}, fit.iterations, fit.converged};
+    result.jacobian.resize(some.rows() + priors, priors);
+    result.jacobian << some, fit.jacobian.bottomRows(priors);
+    result.point.residual.resize(some.rows() + priors);
+    result.point.residual << pooled(fit.point.residual.head(readings), rows), fit.point.residual.tail(priors);
+    return result;
 }
 
 /// Averages the evidence over sizes and smoothnesses; keeps the course of the best.
@@ -165,9 +179,10 @@ std::pair<double, double> Nameless::window_s() const {
     return from_s > to_s ? std::pair(time_s.front(), time_s.back()) : std::pair(from_s, to_s);
 }
 
-std::vector<Nameless> nameless_explanations(const FitProblem& problem, const Fit& fit,
-                                            const Linearisation& linearisation) {
+std::vector<Nameless> nameless_explanations(const FitProblem& problem, const Fit& fit) {
     const Observation& seen = problem.data().seen;
+    const Fit fewer = with_pooled_readings(fit);
+    const Linearisation linearisation(fewer);
     const Hats hat = hats_over(seen);
     std::vector<Nameless> all;
     const EffectDefinition& steady = *find_effect("motor_heat");

@@ -29,7 +29,6 @@ struct Nameless {
 
 /// Every node and every sensor, best first. A Gaussian process of unknown size and smoothness over triangular
 /// hats, responses linear around the fit, all parameters of the fit free to follow.
-std::vector<Nameless> nameless_explanations(const FitProblem& problem, const Fit& fit,
-                                            const Linearisation& linearisation);
+std::vector<Nameless> nameless_explanations(const FitProblem& problem, const Fit& fit);
 
 }  // namespace thermbal

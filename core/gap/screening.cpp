@@ -7,19 +7,28 @@
 namespace thermbal {
 namespace {
 
-constexpr int onsets_on_grid = 40;
-constexpr int onsets_of_the_whole_machine = 200;  ///< a stop of a minute or two is over before the next of 40
+constexpr int onsets_on_grid = 12;  ///< to begin with; halved twice around the best
+constexpr int onsets_of_a_stop = 40;
+
+std::vector<double> spread_over(const Observation& seen, int count) {
+    std::vector<double> moments_s;
+    const double begin_s = seen.time_s.front(), length_s = seen.time_s.back() - begin_s;
+    for (int k = 0; k < count; ++k) moments_s.push_back(begin_s + length_s * (k + 0.5) / count);
+    return moments_s;
+}
 
 /// Values of a shape parameter that a fit may have to begin at to arrive.
 std::vector<double> grid_of(const EffectParameterDefinition& definition, const ResolvedPrior& prior,
-                            const Observation& seen, const std::vector<double>& periods_s, int onset_count) {
+                            const Observation& seen, const ResidualTiming& timing, bool of_a_stop) {
+    if (definition.is_time && !of_a_stop) return spread_over(seen, onsets_on_grid);
     if (definition.is_time) {
-        std::vector<double> onsets;
-        const double begin_s = seen.time_s.front(), length_s = seen.time_s.back() - begin_s;
-        for (int k = 0; k < onset_count; ++k) onsets.push_back(begin_s + length_s * (k + 0.5) / onset_count);
+        std::vector<double> onsets = spread_over(seen, onsets_of_a_stop);
+        for (const double moment_s : timing.moments_s) {  // one of seconds is over before the next of these
+            for (const double bins : {-1.5, -1.0, -0.5}) onsets.push_back(moment_s + bins * seen.bin_s);
+        }
         return onsets;
     }
-    if (definition.name == "period_s") return periods_s;
+    if (definition.name == "period_s") return timing.periods_s;
     if (!std::isfinite(prior.sigma))
         return {prior.lower + 0.25 * (prior.upper - prior.lower), 0.5 * (prior.lower + prior.upper),
                 prior.lower + 0.75 * (prior.upper - prior.lower)};
@@ -47,12 +56,16 @@ std::vector<Effect> with_phases(const std::vector<Effect>& shapes) {
     return result;
 }
 
+/// A size that is a length of time changes the effect's shape: a stop of a minute is not a tenth of one of
+/// ten.
+bool is_a_stop(const Candidate& candidate) {
+    return candidate.form->parameters.front().name == "duration_s";
+}
+
 /// Shapes to try: all combinations of the grids of every parameter but the first, which sizes the effect.
 std::vector<Effect> shapes_of(const Candidate& candidate, const Model& model, const Observation& seen,
-                              const std::vector<double>& periods_s) {
+                              const ResidualTiming& timing) {
     std::vector<Effect> shapes = {make_effect(*candidate.definition, *candidate.form, candidate.at, model)};
-    const int onset_count =
-        candidate.form->site == EffectSite::whole_model ? onsets_of_the_whole_machine : onsets_on_grid;
     for (std::size_t p = 1; p < candidate.form->parameters.size(); ++p) {
         const EffectParameterDefinition& definition = candidate.form->parameters[p];
         if (definition.name == "first_on_s") {
@@ -61,7 +74,7 @@ std::vector<Effect> shapes_of(const Candidate& candidate, const Model& model, co
         }
         if (definition.when_absent) continue;
         const auto values =
-            grid_of(definition, resolve_prior(definition, model), seen, periods_s, onset_count);
+            grid_of(definition, resolve_prior(definition, model), seen, timing, is_a_stop(candidate));
         std::vector<Effect> wider;
         for (const Effect& shape : shapes) {
             for (const double value : values) {
@@ -96,35 +109,69 @@ double size_of(const SizeProbe& probe, double amplitude, const ResolvedPrior& pr
     return std::clamp(std::max(wanted, least), prior.lower, prior.upper);
 }
 
-}  // namespace
+/// Keeps the shape that gains most.
+class BestShape {
+  public:
+    BestShape(const Candidate& candidate, const ScreeningGround& ground)
+        : ground_(&ground),
+          prior_(resolve_prior(candidate.form->parameters.front(), ground.model())),
+          best_{candidate, make_effect(*candidate.definition, *candidate.form, candidate.at, ground.model()),
+                0.0} {}
 
-Screened screen(const Candidate& candidate, const ScreeningGround& ground,
-                const std::vector<double>& periods_s) {
-    const Observation& seen = ground.run();
-    const Model& model = ground.model();
-    const ResolvedPrior prior = resolve_prior(candidate.form->parameters.front(), model);
-    std::vector<SizeProbe> probes = {probe_of(prior)};
-    // A size that is a length of time changes the effect's shape: a stop of a minute is not a tenth of one of
-    // ten.
-    if (candidate.form->parameters.front().name == "duration_s") {
-        probes.push_back({true, std::max(0.1 * prior.centre, seen.bin_s)});
+    const ResolvedPrior& prior() const { return prior_; }
+    const Screened& found() const { return best_; }
+
+    void look_at(Effect shape, const SizeProbe& probe) {
+        shape.parameters.front().value = probe.value;
+        const auto change = ground_->change_by(shape);
+        if (!change) return;
+        const auto gain = ground_->linearisation().gain_of(*change);
+        const bool one_sided = probe.relative && prior_.lower >= 0.0;
+        if (one_sided && gain.amplitude <= 0.0) return;
+        if (gain.log_likelihood <= best_.log_likelihood_gain) return;
+        best_.log_likelihood_gain = gain.log_likelihood;
+        best_.start = std::move(shape);
+        best_.start.parameters.front().value = size_of(probe, gain.amplitude, prior_);
+        best_probe_ = probe;
     }
-    Screened best{candidate, make_effect(*candidate.definition, *candidate.form, candidate.at, model), 0.0};
-    for (const SizeProbe& probe : probes) {
-        for (Effect& shape : shapes_of(candidate, model, seen, periods_s)) {
-            shape.parameters.front().value = probe.value;
-            const auto change = ground.change_by(shape);
-            if (!change) continue;
-            const auto gain = ground.linearisation().gain_of(*change);
-            const bool one_sided = probe.relative && prior.lower >= 0.0;
-            if (one_sided && gain.amplitude <= 0.0) continue;
-            if (gain.log_likelihood <= best.log_likelihood_gain) continue;
-            best.log_likelihood_gain = gain.log_likelihood;
-            best.start = shape;
-            best.start.parameters.front().value = size_of(probe, gain.amplitude, prior);
+
+    /// Moves the onset of the best shape to both sides, twice, half as far each time.
+    void refine_onset(const std::string& onset) {
+        double step_s = (ground_->run().time_s.back() - ground_->run().time_s.front()) / onsets_on_grid;
+        for (int round = 0; round < 2; ++round) {
+            step_s *= 0.5;
+            const Effect middle = best_.start;
+            for (const double side : {-1.0, 1.0}) {
+                Effect moved = middle;
+                std::ranges::find(moved.parameters, onset, &EffectParameter::name)->value += side * step_s;
+                look_at(std::move(moved), best_probe_);
+            }
         }
     }
-    return best;
+
+  private:
+    const ScreeningGround* ground_;
+    ResolvedPrior prior_;
+    Screened best_;
+    SizeProbe best_probe_;
+};
+
+}  // namespace
+
+Screened screen(const Candidate& candidate, const ScreeningGround& ground, const ResidualTiming& timing) {
+    const Observation& seen = ground.run();
+    BestShape best(candidate, ground);
+    std::vector<SizeProbe> probes = {probe_of(best.prior())};
+    if (is_a_stop(candidate)) probes.push_back({true, std::max(0.1 * best.prior().centre, seen.bin_s)});
+    for (const SizeProbe& probe : probes) {
+        for (Effect& shape : shapes_of(candidate, ground.model(), seen, timing))
+            best.look_at(std::move(shape), probe);
+    }
+    for (const EffectParameterDefinition& definition : candidate.form->parameters) {
+        const bool on_grid = definition.is_time && !definition.when_absent && !is_a_stop(candidate);
+        if (on_grid && best.found().log_likelihood_gain > 0.0) best.refine_onset(definition.name);
+    }
+    return best.found();
 }
 
 }  // namespace thermbal

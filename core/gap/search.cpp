@@ -77,6 +77,8 @@ Result<void> take_effects(const Evidence& evidence, SearchResult& search, const 
             search.current = std::move(*polished);
             search.steps.push_back({search.current.effects.back(), odds, support == Support::relative});
         }
+        if (!taken && !odds.kinds.empty())
+            search.left_start = best_of(found, odds).explanation.effects.back();
         if (search.first_survey.nameless.empty()) search.first_survey = std::move(found);
         if (taken) continue;
         search.left = std::move(odds);
@@ -108,11 +110,36 @@ Result<bool> look_again(const Evidence& evidence, SearchResult& search) {
     return taken.kind != old.kind || taken.at != old.at;
 }
 
+/// What is left may be what several names at its place only dress up: it is taken instead of them when that
+/// describes the run better. True when it was.
+Result<bool> take_instead(const Evidence& evidence, SearchResult& search) {
+    if (search.left.kinds.empty() || search.left.kinds.front().probability < 0.5) return false;
+    const Effect& left = search.left_start;
+    std::vector<Effect> effects;
+    std::vector<Step> steps;
+    for (std::size_t k = 0; k < search.steps.size(); ++k) {
+        if (is_dressing_up(search.current.effects[k], left, search.current.fit.model)) continue;
+        effects.push_back(search.current.effects[k]);
+        steps.push_back(search.steps[k]);
+    }
+    if (effects.size() == search.steps.size()) return false;
+    const auto without = explain(evidence, effects, nullptr);
+    if (!without) return std::unexpected(without.error());
+    effects.push_back(left);
+    steps.push_back({left, search.left, false});
+    auto instead = explain(evidence, std::move(effects), &*without);
+    if (instead) instead = polish(evidence, *instead);
+    if (!instead || instead->log_evidence < search.current.log_evidence) return false;
+    search.current = std::move(*instead);
+    search.steps = std::move(steps);
+    return true;
+}
+
 }  // namespace
 
 Result<SearchResult> search_effects(const Evidence& evidence, Explanation base,
                                     const DiagnoseOptions& options) {
-    SearchResult search{{}, base, std::move(base), {}, {}};
+    SearchResult search{{}, base, std::move(base), {}, {}, {}};
     if (auto done = take_effects(evidence, search, options); !done) return std::unexpected(done.error());
     bool changed = false;
     const std::size_t taken = search.steps.size();
@@ -122,6 +149,11 @@ Result<SearchResult> search_effects(const Evidence& evidence, Explanation base,
         changed = changed || *other;
     }
     if (changed) {
+        if (auto done = take_effects(evidence, search, options); !done) return std::unexpected(done.error());
+    }
+    const auto other = take_instead(evidence, search);
+    if (!other) return std::unexpected(other.error());
+    if (*other) {
         if (auto done = take_effects(evidence, search, options); !done) return std::unexpected(done.error());
     }
     doubt_what_is_dressed_up(search);

@@ -22,6 +22,7 @@ struct SearchResult {
     Explanation current;  ///< all that were taken
     Survey first_survey;  ///< what might be missing from the base
     Odds left;            ///< what might be missing still
+    Effect left_start;    ///< the likeliest of it, with the catalogue's priors
 };
 
 /// Forward selection by evidence: the best candidate is taken while something is missing and a name for it is

@@ -4,7 +4,7 @@
 
 #include "explanation.hpp"
 #include "ground.hpp"
-#include "periods.hpp"
+#include "residual_timing.hpp"
 
 namespace thermbal {
 namespace {
@@ -14,14 +14,16 @@ constexpr double gain_behind_the_best = 0.6;  ///< share of the best gain that a
 constexpr std::size_t most_refits = 24;
 constexpr int most_of_a_kind = 3;
 constexpr std::size_t most_forecasts = 12;
+constexpr std::size_t most_polished = 6;
+constexpr double close_to_the_best = 8.0;  ///< nats; to which a fifth of the best comes
 
 std::vector<Screened> screen_all(const Evidence& evidence, const Explanation& current) {
     const ScreeningGround ground(evidence, current);
-    const auto periods_s = residual_periods_s(evidence.run, current.fit.point, 3);
+    const ResidualTiming timing = residual_timing(evidence.run, current.fit.point);
     const auto candidates = all_candidates(current.fit.model, evidence.room_columns);
     std::vector<Screened> screened(candidates.size());
     evidence.parallel_for(candidates.size(),
-                          [&](std::size_t i) { screened[i] = screen(candidates[i], ground, periods_s); });
+                          [&](std::size_t i) { screened[i] = screen(candidates[i], ground, timing); });
     std::ranges::sort(screened, std::ranges::greater{}, &Screened::log_likelihood_gain);
     return screened;
 }
@@ -43,51 +45,87 @@ std::vector<Screened> worth_refitting(const std::vector<Screened>& screened) {
     return chosen;
 }
 
-/// How much better the contenders predict the held-out runs than the current explanation does.
-void compare_forecasts(const Evidence& evidence, const Explanation& current,
-                       std::vector<Contender>& contenders) {
-    for (const FitData& holdout : evidence.holdouts) {
-        const auto reference = forecast(holdout, evidence, current);
-        if (!reference) continue;
-        evidence.parallel_for(std::min(contenders.size(), most_forecasts), [&](std::size_t i) {
-            Explanation& explanation = contenders[i].explanation;
-            const auto better = forecast(holdout, evidence, explanation, &reference->sensitivity);
-            if (better) explanation.log_prediction += better->log_density - reference->log_density;
-        });
-    }
+/// The model with the candidate, fitted with the neighbour's sensitivities, which are good as long as the
+/// numbers stay near it; where that led nowhere, with its own.
+Result<Explanation> fitted_with(const Evidence& evidence, const Explanation& current, const Effect& start) {
+    std::vector<Effect> effects = current.effects;
+    effects.push_back(start);
+    auto quick = explain(evidence, std::move(effects), &current);
+    if (!quick || quick->fit.point.chi2 < current.fit.point.chi2) return quick;
+    return polish(evidence, *quick);
 }
 
-double gained(const Explanation& with, const Explanation& without) {
-    return with.log_evidence - without.log_evidence + with.log_prediction;
+std::vector<Contender> fitted(const Evidence& evidence, const Explanation& current,
+                              const std::vector<Screened>& chosen) {
+    std::vector<std::optional<Explanation>> explanations(chosen.size());
+    evidence.parallel_for(chosen.size(), [&](std::size_t i) {
+        auto explanation = fitted_with(evidence, current, chosen[i].start);
+        if (explanation) explanations[i] = std::move(*explanation);
+    });
+    std::vector<Contender> contenders;
+    for (std::size_t i = 0; i < chosen.size(); ++i) {
+        if (explanations[i]) contenders.push_back({chosen[i].candidate, std::move(*explanations[i]), 0.0});
+    }
+    return contenders;
+}
+
+/// What the current explanation makes of every held-out run; none where it cannot be simulated.
+std::vector<std::optional<Forecast>> forecasts_of(const Evidence& evidence, const Explanation& current) {
+    std::vector<std::optional<Forecast>> result(evidence.holdouts.size());
+    for (std::size_t k = 0; k < result.size(); ++k) {
+        auto one = forecast(evidence.holdouts[k], evidence, current);
+        if (one) result[k] = std::move(*one);
+    }
+    return result;
+}
+
+/// How much better the run is described and, for the first `forecasting` contenders, the held-out runs are
+/// predicted, than by the current explanation. Best first afterwards; a contender that cannot be weighed is
+/// left out.
+void weigh(const Evidence& evidence, const Explanation& current,
+           const std::vector<std::optional<Forecast>>& references, std::size_t forecasting,
+           std::vector<Contender>& contenders) {
+    evidence.parallel_for(contenders.size(), [&](std::size_t i) {
+        Explanation& explanation = contenders[i].explanation;
+        for (std::size_t k = 0; i < forecasting && k < references.size(); ++k) {
+            if (k == 0) explanation.log_prediction = 0.0;
+            if (!references[k]) continue;
+            const auto better =
+                forecast(evidence.holdouts[k], evidence, explanation, &references[k]->sensitivity);
+            if (better) explanation.log_prediction += better->log_density - references[k]->log_density;
+        }
+        contenders[i].log_bayes_factor =
+            explanation.log_evidence - current.log_evidence + explanation.log_prediction;
+    });
+    std::erase_if(contenders, [](const Contender& one) { return !std::isfinite(one.log_bayes_factor); });
+    std::ranges::sort(contenders, std::ranges::greater{}, &Contender::log_bayes_factor);
+}
+
+/// Contenders for the name, fitted once more with sensitivities of their own. Returns how many.
+std::size_t polish_leading(const Evidence& evidence, std::vector<Contender>& contenders) {
+    std::size_t leading = 0;
+    while (leading < std::min(contenders.size(), most_polished) &&
+           contenders[leading].log_bayes_factor > contenders.front().log_bayes_factor - close_to_the_best -
+                                                      0.2 * std::abs(contenders.front().log_bayes_factor))
+        ++leading;
+    evidence.parallel_for(leading, [&](std::size_t i) {
+        auto polished = polish(evidence, contenders[i].explanation);
+        if (polished) contenders[i].explanation = std::move(*polished);
+    });
+    return leading;
 }
 
 }  // namespace
 
 Survey survey(const Evidence& evidence, const Explanation& current) {
     Survey result;
-    const auto chosen = worth_refitting(screen_all(evidence, current));
-    std::vector<std::optional<Explanation>> fitted(chosen.size());
-    evidence.parallel_for(chosen.size(), [&](std::size_t i) {
-        std::vector<Effect> effects = current.effects;
-        effects.push_back(chosen[i].start);
-        auto explanation = explain(evidence, std::move(effects), &current);
-        if (explanation) fitted[i] = std::move(*explanation);
-    });
-    for (std::size_t i = 0; i < chosen.size(); ++i) {
-        if (!fitted[i]) continue;
-        const double worth = fitted[i]->log_evidence - current.log_evidence;
-        result.contenders.push_back({chosen[i].candidate, std::move(*fitted[i]), worth});
-    }
-    std::ranges::sort(result.contenders, std::ranges::greater{}, &Contender::log_bayes_factor);
-    compare_forecasts(evidence, current, result.contenders);
-    for (Contender& contender : result.contenders) {
-        contender.log_bayes_factor = gained(contender.explanation, current);
-    }
-    std::erase_if(result.contenders,
-                  [](const Contender& one) { return !std::isfinite(one.log_bayes_factor); });
-    std::ranges::sort(result.contenders, std::ranges::greater{}, &Contender::log_bayes_factor);
+    result.contenders = fitted(evidence, current, worth_refitting(screen_all(evidence, current)));
+    weigh(evidence, current, {}, 0, result.contenders);
+    const auto references = forecasts_of(evidence, current);
+    weigh(evidence, current, references, most_forecasts, result.contenders);
+    weigh(evidence, current, references, polish_leading(evidence, result.contenders), result.contenders);
     const FitProblem problem(evidence.run, current.fit.model);
-    result.nameless = nameless_explanations(problem, current.fit, Linearisation(current.fit));
+    result.nameless = nameless_explanations(problem, current.fit);
     return result;
 }
 

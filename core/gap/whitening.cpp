@@ -48,4 +48,15 @@ Eigen::VectorXd Whitening::operator()(const Eigen::MatrixXd& difference_C) const
     return white;
 }
 
+Eigen::VectorXd Whitening::log_density(const Eigen::MatrixXd& difference_C) const {
+    const Eigen::VectorXd white = (*this)(difference_C);
+    Eigen::VectorXd result(difference_C.cols());
+    for (Eigen::Index column = 0; column < difference_C.cols(); ++column) {
+        const auto scale = scale_.col(column).array();
+        result(column) = -0.5 * white.segment(column * scale_.rows(), scale_.rows()).squaredNorm() +
+                         (scale > 0.0).select(scale.max(1e-300).log(), 0.0).sum();
+    }
+    return result;
+}
+
 }  // namespace thermbal

@@ -18,6 +18,8 @@ class Whitening {
 
     /// rows x columns as Observation::reading_C, stacked column by column.
     Eigen::VectorXd operator()(const Eigen::MatrixXd& difference_C) const;
+    /// ln of the density of such differences, channel by channel, up to a constant.
+    Eigen::VectorXd log_density(const Eigen::MatrixXd& difference_C) const;
     /// ln of the determinant of the covariance.
     double log_determinant() const { return log_determinant_; }
     int readings() const { return readings_; }

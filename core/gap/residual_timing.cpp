@@ -1,4 +1,4 @@
-#include "periods.hpp"
+#include "residual_timing.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -26,8 +26,6 @@ double power_at(const FitData& data, const FitPoint& point, double frequency_Hz)
     return power;
 }
 
-}  // namespace
-
 std::vector<double> residual_periods_s(const FitData& data, const FitPoint& point, int count) {
     const double length_s = data.seen.time_s.back() - data.seen.time_s.front();
     struct Line {
@@ -53,6 +51,29 @@ std::vector<double> residual_periods_s(const FitData& data, const FitPoint& poin
         periods_s.push_back(line.period_s);
     }
     return periods_s;
+}
+
+std::vector<double> residual_moments_s(const FitData& data, const FitPoint& point, std::size_t count) {
+    constexpr Eigen::Index apart = 4;  ///< bins
+    const auto rows = data.seen.reading_C.rows();
+    const Eigen::VectorXd innovations = point.residual.head(data.seen.reading_C.size());
+    const auto by_channel = innovations.reshaped(rows, data.seen.reading_C.cols());
+    Eigen::VectorXd energy = by_channel.rowwise().squaredNorm();
+    std::vector<double> moments_s;
+    while (moments_s.size() < count) {
+        Eigen::Index row = 0;
+        if (energy.maxCoeff(&row) <= 0.0) break;
+        moments_s.push_back(data.seen.time_s[static_cast<std::size_t>(row)]);
+        const Eigen::Index from = std::max<Eigen::Index>(0, row - apart);
+        energy.segment(from, std::min(rows, row + apart + 1) - from).setZero();
+    }
+    return moments_s;
+}
+
+}  // namespace
+
+ResidualTiming residual_timing(const FitData& data, const FitPoint& point) {
+    return {residual_periods_s(data, point, 3), residual_moments_s(data, point, 10)};
 }
 
 }  // namespace thermbal
