@@ -58,14 +58,6 @@ Disagreement summary(const FitData& data, const FitPoint& point, const Smoothed&
     return one;
 }
 
-double column_at(const Inputs& inputs, const std::string& name, double time_s) {
-    const auto column = std::ranges::find(inputs.columns, name, &Column::name);
-    if (column == inputs.columns.end()) return 0.0;
-    const auto after = std::ranges::upper_bound(inputs.time_s, time_s) - inputs.time_s.begin();
-    const double value = column->values[static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - 1, 0))];
-    return std::isfinite(value) ? value : 0.0;
-}
-
 double correlation(const std::vector<double>& a, const std::vector<double>& b) {
     const auto n = static_cast<double>(a.size());
     double ma = 0.0, mb = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
@@ -114,13 +106,13 @@ std::string what_it_follows(const FitData& data, const Model& model, const Namel
         if (source.proportional_to.empty()) continue;
         std::vector<double> drive;
         for (const double t : nameless.time_s)
-            drive.push_back(column_at(data.seen.inputs, source.proportional_to, t));
+            drive.push_back(value_at(data.seen.inputs, source.proportional_to, t));
         try_driver("speed", drive);
     }
     if (!model.ambient.column.empty()) {
         std::vector<double> room;
         for (const double t : nameless.time_s)
-            room.push_back(column_at(data.seen.inputs, model.ambient.column, t));
+            room.push_back(value_at(data.seen.inputs, model.ambient.column, t));
         try_driver("ambient", room);
     }
     try_driver("own temperature", own_temperature(data, model, nameless));

@@ -25,9 +25,19 @@ struct FitData {
     };
     std::vector<Start> starts;
     double place_sigma = 0.0;  ///< ModelFidelity::place_share
+    /// A node that is heated is warmer where the heat enters, as long as it does: a sensor on it reads a
+    /// little more or less than the node's mean, in proportion to the heat.
+    struct Gradient {
+        Eigen::Index column;
+        Eigen::VectorXd drive;  ///< rows: heat of the node's sources over their heat at the references
+        double range_C;         ///< of the column: place_sigma of it is what the gradient may be
+    };
+    std::vector<Gradient> gradients;
 
-    /// Coordinates of a fit that are not the model's: the starts, then each column's place.
-    Eigen::Index nuisances() const { return static_cast<Eigen::Index>(starts.size() + seen.columns()); }
+    /// Coordinates of a fit that are not the model's: the starts, each column's place, the gradients in C.
+    Eigen::Index nuisances() const {
+        return static_cast<Eigen::Index>(starts.size() + seen.columns() + gradients.size());
+    }
 };
 
 Result<FitData> make_fit_data(const Model& model, const RecordedTest& test,

@@ -35,6 +35,37 @@ std::vector<FitData::Start> starts_of(const Model& model, const Observation& see
     return starts;
 }
 
+/// Heat of a node's sources at a moment, over their heat at the references; 0 without sources.
+double drive_of(const Model& model, const std::string& node, const Inputs& inputs, double time_s) {
+    double heat_W = 0.0, reference_W = 0.0;
+    for (const Source& source : model.sources) {
+        if (source.node != node) continue;
+        const double share =
+            source.proportional_to.empty()
+                ? 1.0
+                : std::pow(std::abs(value_at(inputs, source.proportional_to, time_s) / source.reference),
+                           source.exponent.value);
+        heat_W += share * source.power_W.value;
+        reference_W += source.power_W.value;
+    }
+    return reference_W > 0.0 ? heat_W / reference_W : 0.0;
+}
+
+std::vector<FitData::Gradient> gradients_of(const Model& model, const Observation& seen) {
+    std::vector<FitData::Gradient> gradients;
+    for (std::size_t c = 0; c < seen.columns(); ++c) {
+        const auto column = static_cast<Eigen::Index>(c);
+        Eigen::VectorXd drive(static_cast<Eigen::Index>(seen.rows()));
+        for (std::size_t row = 0; row < seen.rows(); ++row) {
+            drive(static_cast<Eigen::Index>(row)) =
+                drive_of(model, model.sensors[seen.sensors[c]].node, seen.inputs, seen.time_s[row]);
+        }
+        if (drive.cwiseAbs().maxCoeff() > 0.0)
+            gradients.push_back({column, std::move(drive), seen.range_C(column)});
+    }
+    return gradients;
+}
+
 double bounded_log(double value) {
     return value > 0.0 ? std::log(value) : -infinity;
 }
@@ -45,9 +76,10 @@ Result<FitData> make_fit_data(const Model& model, const RecordedTest& test,
                               const CalibrationOptions& options) {
     auto seen = observe(model, test, bin_width_s(test, options.bin_s));
     if (!seen) return std::unexpected(seen.error());
-    FitData data{std::move(*seen), {}, {}, options.fidelity.place_share};
+    FitData data{std::move(*seen), {}, {}, options.fidelity.place_share, {}};
     data.whitening = Whitening(data.seen, options.fidelity);
     data.starts = starts_of(model, data.seen);
+    data.gradients = gradients_of(model, data.seen);
     return data;
 }
 
@@ -83,10 +115,15 @@ Simulated FitProblem::simulated(const Model& model, const Eigen::VectorXd& coord
     const auto simulation = simulate(model, inputs, data_->seen.time_s);
     if (!simulation) return std::unexpected(simulation.error());
     Eigen::MatrixXd readings_C = simulation->reading_C(Eigen::all, data_->seen.sensors);
-    const auto places = nuisances.tail(readings_C.cols());
+    const auto places = nuisances.segment(static_cast<Eigen::Index>(data_->starts.size()), readings_C.cols());
     for (Eigen::Index column = 0; column < readings_C.cols(); ++column) {
         const double start_C = readings_C(0, column);
         readings_C.col(column).array() += places(column) * (readings_C.col(column).array() - start_C);
+    }
+    const auto gradients_C = nuisances.tail(static_cast<Eigen::Index>(data_->gradients.size()));
+    for (std::size_t k = 0; k < data_->gradients.size(); ++k) {
+        const FitData::Gradient& gradient = data_->gradients[k];
+        readings_C.col(gradient.column) += gradients_C(static_cast<Eigen::Index>(k)) * gradient.drive;
     }
     return readings_C;
 }
@@ -151,7 +188,10 @@ Eigen::VectorXd FitProblem::upper() const {
 
 double FitProblem::nuisance_sigma(Eigen::Index nuisance) const {
     const auto k = static_cast<std::size_t>(nuisance);
-    return k < data_->starts.size() ? data_->starts[k].sigma_C : data_->place_sigma;
+    const std::size_t before_gradients = data_->starts.size() + data_->seen.columns();
+    if (k < data_->starts.size()) return data_->starts[k].sigma_C;
+    if (k < before_gradients) return data_->place_sigma;
+    return data_->place_sigma * std::max(data_->gradients[k - before_gradients].range_C, 1e-3);
 }
 
 double FitProblem::flat_sigma(const Parameter& parameter) const {

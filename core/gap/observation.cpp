@@ -81,6 +81,14 @@ void fill_column(Observation& seen, Eigen::Index column, const std::vector<doubl
 
 }  // namespace
 
+double value_at(const Inputs& inputs, const std::string& name, double time_s) {
+    const auto column = std::ranges::find(inputs.columns, name, &Column::name);
+    if (column == inputs.columns.end()) return 0.0;
+    const auto after = std::ranges::upper_bound(inputs.time_s, time_s) - inputs.time_s.begin();
+    const double value = column->values[static_cast<std::size_t>(std::max<std::ptrdiff_t>(after - 1, 0))];
+    return std::isfinite(value) ? value : 0.0;
+}
+
 double noise_from_differences_C(const std::vector<double>& readings) {
     std::vector<double> squares;
     for (std::size_t k = 2; k < readings.size(); ++k) {

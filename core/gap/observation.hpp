@@ -35,6 +35,9 @@ double bin_width_s(const RecordedTest& test, double wanted_s);
 /// Errors: refuse_input when no sensor of the model has a reading in the test.
 Result<Observation> observe(const Model& model, const RecordedTest& test, double bin_s);
 
+/// What a column of the inputs holds at a moment; 0 where it is not there or empty.
+double value_at(const Inputs& inputs, const std::string& column, double time_s);
+
 /// Noise of a channel from its own readings: from second differences, so that warming up does not count. NaN
 /// with fewer than 20.
 double noise_from_differences_C(const std::vector<double>& readings);

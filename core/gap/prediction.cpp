@@ -10,12 +10,20 @@ namespace {
 
 using Eigen::Index;
 
-/// A fit's coordinates in another run: the model's numbers and the sensors' places stay, the starts are new.
+/// How many nuisances of the sensors (places, gradients) another run shares with the fit's: none when other
+/// channels were measured there.
+Index shared_by(const FitProblem& there, const Fit& fit, Index starts_here) {
+    const Index numbers = static_cast<Index>(fit.parameters.size());
+    const Index here = fit.point.coordinates.size() - numbers - starts_here;
+    return here == there.data().nuisances() - static_cast<Index>(there.data().starts.size()) ? here : 0;
+}
+
+/// A fit's coordinates in another run: the model's numbers and the sensors' nuisances stay, the starts are
+/// new.
 Eigen::VectorXd carried_over(const FitProblem& there, const Fit& fit, Index starts_here) {
     Eigen::VectorXd coordinates = there.prior_coordinates();
     const Index numbers = static_cast<Index>(fit.parameters.size());
-    const Index places = std::min<Index>(fit.point.coordinates.size() - numbers - starts_here,
-                                         static_cast<Index>(there.data().seen.columns()));
+    const Index places = shared_by(there, fit, starts_here);
     coordinates.head(numbers) = fit.point.coordinates.head(numbers);
     coordinates.tail(places) = fit.point.coordinates.tail(places);
     return coordinates;
@@ -26,7 +34,7 @@ Eigen::MatrixXd spread_of(const FitProblem& there, const Fit& fit, Index starts_
     const Index numbers = static_cast<Index>(fit.parameters.size());
     const Index size = there.dimensions();
     const Index starts_there = static_cast<Index>(there.data().starts.size());
-    const Index places = size - numbers - starts_there;
+    const Index places = shared_by(there, fit, starts_here);
     const Eigen::MatrixXd covariance =
         fit.hessian().ldlt().solve(Eigen::MatrixXd::Identity(fit.jacobian.cols(), fit.jacobian.cols()));
     std::vector<Index> here, at;

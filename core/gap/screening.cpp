@@ -17,15 +17,40 @@ std::vector<double> spread_over(const Observation& seen, int count) {
     return moments_s;
 }
 
+/// When a column that drives a source jumps.
+std::vector<double> drive_changes_s(const Model& model, const Inputs& inputs) {
+    std::vector<double> moments_s;
+    for (const Column& column : inputs.columns) {
+        if (std::ranges::find(model.sources, column.name, &Source::proportional_to) == model.sources.end())
+            continue;
+        for (std::size_t row = 1; row < column.values.size(); ++row) {
+            const double before = column.values[row - 1], after = column.values[row];
+            if (std::abs(after - before) > 0.05 * std::max(std::abs(after), std::abs(before)))
+                moments_s.push_back(inputs.time_s[row]);
+        }
+    }
+    return moments_s;
+}
+
+/// A column knows a change to within a row: what looks like a stop right beside it is that.
+void leave_out_known_changes(std::vector<double>& onsets_s, const Model& model, const Observation& seen) {
+    constexpr double bins = 2.5;
+    for (const double change_s : drive_changes_s(model, seen.inputs))
+        std::erase_if(onsets_s,
+                      [&](double onset_s) { return std::abs(onset_s - change_s) < bins * seen.bin_s; });
+}
+
 /// Values of a shape parameter that a fit may have to begin at to arrive.
 std::vector<double> grid_of(const EffectParameterDefinition& definition, const ResolvedPrior& prior,
-                            const Observation& seen, const ResidualTiming& timing, bool of_a_stop) {
+                            const Model& model, const Observation& seen, const ResidualTiming& timing,
+                            bool of_a_stop) {
     if (definition.is_time && !of_a_stop) return spread_over(seen, onsets_on_grid);
     if (definition.is_time) {
         std::vector<double> onsets = spread_over(seen, onsets_of_a_stop);
         for (const double moment_s : timing.moments_s) {  // one of seconds is over before the next of these
             for (const double bins : {-1.5, -1.0, -0.5}) onsets.push_back(moment_s + bins * seen.bin_s);
         }
+        leave_out_known_changes(onsets, model, seen);
         return onsets;
     }
     if (definition.name == "period_s") return timing.periods_s;
@@ -74,7 +99,7 @@ std::vector<Effect> shapes_of(const Candidate& candidate, const Model& model, co
         }
         if (definition.when_absent) continue;
         const auto values =
-            grid_of(definition, resolve_prior(definition, model), seen, timing, is_a_stop(candidate));
+            grid_of(definition, resolve_prior(definition, model), model, seen, timing, is_a_stop(candidate));
         std::vector<Effect> wider;
         for (const Effect& shape : shapes) {
             for (const double value : values) {

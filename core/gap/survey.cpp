@@ -14,7 +14,7 @@ constexpr double gain_behind_the_best = 0.6;  ///< share of the best gain that a
 constexpr std::size_t most_refits = 24;
 constexpr int most_of_a_kind = 3;
 constexpr std::size_t most_forecasts = 12;
-constexpr std::size_t most_polished = 6;
+constexpr std::size_t most_polished = 4;
 constexpr double close_to_the_best = 8.0;  ///< nats; to which a fifth of the best comes
 
 std::vector<Screened> screen_all(const Evidence& evidence, const Explanation& current) {

