@@ -1,9 +1,11 @@
 #include "fidelity.hpp"
 
-#include <algorithm>
 #include <array>
 #include <limits>
+#include <utility>
 #include <vector>
+
+#include "base/median.hpp"
 
 namespace thermbal {
 namespace {
@@ -27,9 +29,7 @@ double share_of_rise_seen(const FitData& data, const FitPoint& point, const Mode
             share[c] = one;
         }
     }
-    const auto middle = share.begin() + static_cast<std::ptrdiff_t>(share.size() / 2);
-    std::ranges::nth_element(share, middle);
-    return *middle;
+    return upper_median(std::move(share));
 }
 
 void allow_for(Evidence& evidence, double share_of_rise) {

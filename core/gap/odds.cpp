@@ -93,4 +93,13 @@ Odds odds_of(const Survey& survey, const Model& model, const OddsOptions& option
     return sorted;
 }
 
+Odds among_names(Odds odds, double probability) {
+    double named = 0.0;
+    for (const Suspect& suspect : odds.kinds) named += suspect.probability;
+    for (Suspect& suspect : odds.kinds) suspect.probability *= probability / named;
+    odds.nameless = 1.0 - probability;
+    odds.nothing = 0.0;
+    return odds;
+}
+
 }  // namespace thermbal

@@ -29,4 +29,7 @@ struct Odds {
 
 Odds odds_of(const Survey& survey, const Model& model, const OddsOptions& options = {});
 
+/// The same odds once it is known with a probability that it is one of the names.
+Odds among_names(Odds odds, double probability);
+
 }  // namespace thermbal

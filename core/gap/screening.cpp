@@ -17,9 +17,9 @@ std::vector<double> spread_over(const Observation& seen, int count) {
     return moments_s;
 }
 
-/// When a column that drives a source jumps.
+/// When the spindle starts, and when a column that drives a source jumps.
 std::vector<double> drive_changes_s(const Model& model, const Inputs& inputs) {
-    std::vector<double> moments_s;
+    std::vector<double> moments_s = {inputs.time_s.front()};
     for (const Column& column : inputs.columns) {
         if (std::ranges::find(model.sources, column.name, &Source::proportional_to) == model.sources.end())
             continue;

@@ -63,6 +63,16 @@ void doubt_what_is_dressed_up(SearchResult& search) {
     }
 }
 
+/// A name that was taken in doubt, and after which nothing more is missing, does describe what was seen.
+void lift_doubt(SearchResult& search) {
+    if (search.left.something_is_missing()) return;
+    for (Step& step : search.steps) {
+        if (!step.doubtful) continue;
+        step.doubtful = false;
+        step.odds = among_names(std::move(step.odds), search.left.nothing);
+    }
+}
+
 /// Takes effects until nothing more is missing or nothing more has a name.
 Result<void> take_effects(const Evidence& evidence, SearchResult& search, const DiagnoseOptions& options) {
     while (true) {
@@ -156,6 +166,7 @@ Result<SearchResult> search_effects(const Evidence& evidence, Explanation base,
     if (*other) {
         if (auto done = take_effects(evidence, search, options); !done) return std::unexpected(done.error());
     }
+    lift_doubt(search);
     doubt_what_is_dressed_up(search);
     return search;
 }
