@@ -17,6 +17,8 @@ namespace {
 
 using Eigen::VectorXd;
 
+constexpr std::size_t most_kept_numbers = 500'000;  ///< 4 MB
+
 constexpr TubeSolver::Schedule wide{
     .first_smoothing = 0.5, .factor = 0.1, .last_smoothing = 1e-3, .most_steps = 1000};
 constexpr TubeSolver::Schedule exact{
@@ -84,10 +86,21 @@ class GridSearch {
     }
 
     Result<void> cross_validate(const Candidate& candidate) {
+        let_go_of_others(candidate.sigma_index);
         const auto mse = columns_[candidate.sigma_index].mean_mse(candidate, best_mean_mse_, cancelled_);
         if (!mse) return std::unexpected(mse.error());
         if (*mse) offer(**mse, candidate.sigma_index, candidate.C_index);
         return {};
+    }
+
+    /// Rough windows have kernels of a rank in the hundreds: all columns together would take a gigabyte.
+    void let_go_of_others(std::size_t used) {
+        std::size_t kept = 0;
+        for (const SigmaColumn& column : columns_) kept += column.kept_numbers();
+        if (kept <= most_kept_numbers) return;
+        for (std::size_t sigma = 0; sigma < columns_.size(); ++sigma) {
+            if (sigma != used) columns_[sigma].release();
+        }
     }
 
     void offer(double mean_mse, std::size_t sigma, std::size_t C) {

@@ -138,6 +138,20 @@ Result<std::optional<double>> SigmaColumn::mean_mse(const Candidate& candidate, 
     return race.mean_mse();
 }
 
+std::size_t SigmaColumn::kept_numbers() const {
+    if (!kernel_) return 0;
+    const auto numbers = static_cast<std::size_t>(kernel_->features.size());
+    // Every fold has its rows twice, by feature and by row.
+    return numbers + 2 * numbers *
+                         static_cast<std::size_t>(std::ranges::count_if(
+                             fitted_, [](const auto& fold) { return fold.has_value(); }));
+}
+
+void SigmaColumn::release() {
+    kernel_.reset();
+    for (auto& fold : fitted_) fold.reset();
+}
+
 /// The first fold from where it was roughly, the others from the first.
 void SigmaColumn::start_fold(std::size_t f, const Candidate& candidate) {
     const double C = options_.C_grid[candidate.C_index];

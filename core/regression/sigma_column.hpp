@@ -44,6 +44,10 @@ class SigmaColumn {
     Result<std::optional<double>> mean_mse(const Candidate& candidate, double bound,
                                            const Cancelled& cancelled);
 
+    /// What is kept between calls of mean_mse(), in numbers; and lets go of it: the next call makes it again.
+    std::size_t kept_numbers() const;
+    void release();
+
   private:
     const KernelFeatures& kernel();
     HeldOutFold& fold(std::size_t f);
