@@ -12,14 +12,23 @@
 namespace thermbal {
 namespace {
 
+std::string explain_inputs(const std::vector<KnownInput>& inputs) {
+    if (inputs.empty()) return "";
+    std::vector<std::string> values;
+    for (const KnownInput& input : inputs) values.push_back(fmt::format("{} = {}", input.name, input.value));
+    return fmt::format("inputs = {{ {} }}\n", fmt::join(values, ", "));
+}
+
 std::string explain_test(const TestConfig& test) {
     const std::string limit = test.max_duration_min
                                   ? fmt::format("max_duration_min = {}\n", *test.max_duration_min)
                                   : std::string();
     return fmt::format(
-        "[test]\nname = {}\nmachine = {}\nperiod_s = {}\n{}keep_measuring = {}\nstart = \"{}\"\n",
+        "[test]\nname = {}\nmachine = {}\nperiod_s = {}\n{}keep_measuring = {}\nstart = \"{}\"\n{}{}",
         toml_quoted(test.name), toml_quoted(test.machine), test.period_s, limit, test.keep_measuring,
-        test.start == TestConfig::Start::manual ? "manual" : "auto");
+        test.start == TestConfig::Start::manual ? "manual" : "auto",
+        test.model.empty() ? "" : fmt::format("model = {}\n", toml_quoted(test.model)),
+        explain_inputs(test.inputs));
 }
 
 /// 1.001 s is 1001 ms, not the 1000.9999999999999 of binary fractions.

@@ -10,6 +10,7 @@
 
 #include "checks.hpp"
 #include "mqtt.hpp"
+#include "series/recorded_test.hpp"
 #include "toml_reader.hpp"
 
 namespace thermbal {
@@ -73,6 +74,19 @@ class Loader {
         if (const auto start = reader.choice("start", {"manual", "auto"})) {
             test.start = *start == 0 ? TestConfig::Start::manual : TestConfig::Start::automatic;
         }
+        read_path(reader, "model", test.model);
+        if (const toml::table* inputs = reader.table("inputs")) read_inputs(*inputs, test);
+    }
+
+    void read_inputs(const toml::table& table, TestConfig& test) {
+        TableReader reader(table, "test.inputs", complaints_);
+        for (const auto& [key, value] : table) {
+            if (!is_input_name(key.str()))
+                reader.complain(key.str(), "accepted: a name of letters, digits and _ that is no channel's");
+            if (const auto number = reader.number(key.str(), {-1e12, 1e12}))
+                test.inputs.push_back({std::string(key.str()), *number});
+        }
+        reader.finish();
     }
 
     void read_path(TableReader& reader, std::string_view key, std::string& path) {

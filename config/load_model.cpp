@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "config/model_file.hpp"
 #include "network/effect.hpp"
@@ -19,7 +20,9 @@ constexpr Range relative{0.0, 10.0};
 
 class ModelLoader {
   public:
-    ModelLoader(const toml::table& root, Complaints& complaints) : root_(root), complaints_(complaints) {}
+    /// `columns`: of the test that the model is for; null: of any.
+    ModelLoader(const toml::table& root, Complaints& complaints, const TestColumns* columns)
+        : root_(root), complaints_(complaints), columns_(columns) {}
 
     Model load() {
         TableReader reader(root_, "", complaints_);
@@ -34,6 +37,7 @@ class ModelLoader {
         reader.finish();
         // What the rest would say about a number that was refused would be about its default.
         if (complaints_.empty()) complain_about_the_whole();
+        if (complaints_.empty() && columns_ != nullptr) complain_about_columns();
         return std::move(model_);
     }
 
@@ -209,21 +213,64 @@ class ModelLoader {
         }
     }
 
+    const toml::node& place(ModelPlace::Table kind, std::size_t index, std::string_view key) {
+        const toml::table& table = *tables_of(kind)[index];
+        const toml::node* node = table.get(key);
+        return node == nullptr ? table : *node;
+    }
+
+    void complain_about_columns() {
+        const auto known = [&](const std::string& name) {
+            return name.empty() || columns_->channels.contains(name) || columns_->inputs.contains(name);
+        };
+        if (!known(model_.ambient.column)) {
+            complaints_.add(
+                place(ModelPlace::Table::model, 0, "ambient_C").source(), "model.ambient_C",
+                fmt::format("found \"{}\"; the test has no such channel; accepted: a number or {}",
+                            model_.ambient.column, fmt::join(columns_->channels, ", ")));
+        }
+        for (std::size_t i = 0; i < model_.sources.size(); ++i) {
+            const std::string& column = model_.sources[i].proportional_to;
+            if (known(column)) continue;
+            complaints_.add(
+                place(ModelPlace::Table::source, i, "proportional_to").source(), "source.proportional_to",
+                fmt::format("found \"{0}\"; the test has no such input; say what it is: start --input "
+                            "{0}=VALUE, or inputs = {{ {0} = VALUE }} in [test]",
+                            column));
+        }
+        const bool measured = std::ranges::any_of(model_.sensors, [&](const Sensor& sensor) {
+            return columns_->channels.contains(sensor.channel);
+        });
+        if (measured) return;
+        complaints_.add(root_.source(), "sensor.channel",
+                        fmt::format("no [[sensor]] is a channel of the test; its channels are {}",
+                                    fmt::join(columns_->channels, ", ")));
+    }
+
     const toml::table& root_;
     Complaints& complaints_;
+    const TestColumns* columns_;
     Model model_;
     std::array<Tables, 6> tables_;
 };
 
-}  // namespace
-
-Result<Model> load_model(std::string_view toml, std::string_view file_name) {
+Result<Model> loaded(std::string_view toml, std::string_view file_name, const TestColumns* columns) {
     Complaints complaints(file_name);
     const auto root = parse_toml(toml, complaints);
     if (!root) return std::unexpected(complaints.error());
-    Model model = ModelLoader(*root, complaints).load();
+    Model model = ModelLoader(*root, complaints, columns).load();
     if (!complaints.empty()) return std::unexpected(complaints.error());
     return model;
+}
+
+}  // namespace
+
+Result<Model> load_model(std::string_view toml, std::string_view file_name) {
+    return loaded(toml, file_name, nullptr);
+}
+
+Result<Model> load_model(std::string_view toml, std::string_view file_name, const TestColumns& columns) {
+    return loaded(toml, file_name, &columns);
 }
 
 }  // namespace thermbal

@@ -38,7 +38,7 @@ double mean_of_first(std::span<const double> values, std::size_t count) {
 }
 
 /// What a sensor said until it fell silent is no ground for a declaration now.
-Guard newest_sample_is_fresh(const Evidence& evidence, const GuardOptions& options) {
+Guard newest_sample_is_fresh(const GuardEvidence& evidence, const GuardOptions& options) {
     const std::vector<double>& values = evidence.samples.values;
     std::size_t missing = 0;
     while (missing < values.size() && !std::isfinite(values[values.size() - 1 - missing])) ++missing;
@@ -48,7 +48,7 @@ Guard newest_sample_is_fresh(const Evidence& evidence, const GuardOptions& optio
                         options.newest_sample_min)};
 }
 
-Guard no_recent_change(const Evidence& evidence, const GuardOptions& options) {
+Guard no_recent_change(const GuardEvidence& evidence, const GuardOptions& options) {
     const bool ever =
         evidence.regime.last_change_s > evidence.window.start_s || !evidence.regime.began_with.empty();
     const double since_min = (evidence.window.end_s() - evidence.regime.last_change_s) / 60.0;
@@ -76,7 +76,7 @@ std::optional<double> room_step_C(std::span<const double> room_C, std::size_t en
 /// A door that has just opened is not found as a change yet; the room's sensor shows it within two minutes.
 /// Against what is usual in this room, so that an air conditioner that cycles does not hold every channel for
 /// ever.
-Guard room_is_quiet(const Evidence& evidence, const FlowOptions& options) {
+Guard room_is_quiet(const GuardEvidence& evidence, const FlowOptions& options) {
     Guard guard{"room_is_quiet", true, "no step of the room"};
     const Column* room = options.ambient.empty() ? nullptr : evidence.window.channel(options.ambient);
     if (room == nullptr) return guard;
@@ -105,7 +105,7 @@ Guard room_is_quiet(const Evidence& evidence, const FlowOptions& options) {
     return guard;
 }
 
-Guard enough_samples(const Evidence& evidence, const GuardOptions& options) {
+Guard enough_samples(const GuardEvidence& evidence, const GuardOptions& options) {
     const double window_min = (evidence.window.end_s() - evidence.window.start_s) / 60.0;
     const auto good =
         std::ranges::count_if(evidence.samples.values, [](double value) { return std::isfinite(value); });
@@ -132,7 +132,8 @@ Guard interval_within_tolerance(const ChannelEstimate& now, const FlowOptions& o
                         now.steady_state_C, half_C, allowed_C)};
 }
 
-Guard stable_over_windows(const ChannelEstimate& now, const Evidence& evidence, const FlowOptions& options) {
+Guard stable_over_windows(const ChannelEstimate& now, const GuardEvidence& evidence,
+                          const FlowOptions& options) {
     double low_C = now.steady_state_C, high_C = now.steady_state_C;
     std::size_t seen = 0;
     for (const SpectrumEstimate* shorter : evidence.shorter) {
@@ -150,7 +151,7 @@ Guard stable_over_windows(const ChannelEstimate& now, const Evidence& evidence, 
                               high_C - low_C, 2.0 * options.guards.look_back_min, allowed_C)};
 }
 
-Guard slowest_seen_long_enough(const ChannelEstimate& now, const Evidence& evidence,
+Guard slowest_seen_long_enough(const ChannelEstimate& now, const GuardEvidence& evidence,
                                const GuardOptions& options) {
     // A channel that rises little may hide its share of the machine's slowest mode in the noise.
     const double slowest_min =
@@ -206,7 +207,7 @@ double median_move_C(const TestWindow& window, std::size_t since) {
 }
 
 /// The very same reading while the other channels warm: a sensor or an input that does not measure any more.
-bool is_stuck(const Evidence& evidence, const GuardOptions& options) {
+bool is_stuck(const GuardEvidence& evidence, const GuardOptions& options) {
     const std::size_t start = start_of_last_run(evidence.samples.values);
     const double run_min =
         static_cast<double>(evidence.window.scans - start) * evidence.window.period_s / 60.0;
@@ -239,7 +240,7 @@ ChannelVerdict begin_verdict(const Column& column, double window_end_min) {
     return verdict;
 }
 
-void ask_samples(ChannelVerdict& verdict, const Evidence& evidence, const FlowOptions& options) {
+void ask_samples(ChannelVerdict& verdict, const GuardEvidence& evidence, const FlowOptions& options) {
     const bool any_good =
         std::ranges::any_of(evidence.samples.values, [](double value) { return std::isfinite(value); });
     const auto scans = static_cast<std::size_t>(options.guards.stuck_min * 60.0 / evidence.window.period_s);
@@ -265,7 +266,7 @@ void ask_samples(ChannelVerdict& verdict, const Evidence& evidence, const FlowOp
     verdict.guards.push_back(room_is_quiet(evidence, options));
 }
 
-void take_estimate(ChannelVerdict& verdict, const Evidence& evidence) {
+void take_estimate(ChannelVerdict& verdict, const GuardEvidence& evidence) {
     const ChannelEstimate* now = estimate_of(evidence.now, verdict.channel);
     if (now == nullptr) return;
     verdict.steady_state_C = now->steady_state_C;
@@ -276,7 +277,7 @@ void take_estimate(ChannelVerdict& verdict, const Evidence& evidence) {
     verdict.equilibrium_time_high_min = now->equilibrium_high_min;
 }
 
-void ask_shared_modes(ChannelVerdict& verdict, const Evidence& evidence, const FlowOptions& options) {
+void ask_shared_modes(ChannelVerdict& verdict, const GuardEvidence& evidence, const FlowOptions& options) {
     const ChannelEstimate* now = estimate_of(evidence.now, verdict.channel);
     if (now == nullptr) {
         verdict.guards.push_back(

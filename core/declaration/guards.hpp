@@ -19,7 +19,7 @@ struct Regime {
 Regime current_regime(const TestWindow& window, const FlowOptions& options);
 
 /// What the guards of one channel look at. References outlive the call.
-struct Evidence {
+struct GuardEvidence {
     const TestWindow& window;
     const Column& samples;
     const Regime& regime;
@@ -30,12 +30,12 @@ struct Evidence {
 ChannelVerdict begin_verdict(const Column& column, double window_end_min);
 
 // Each asks its predicates, in the order in which a person would, and appends them to verdict.guards.
-void ask_samples(ChannelVerdict& verdict, const Evidence& evidence, const FlowOptions& options);
-void ask_shared_modes(ChannelVerdict& verdict, const Evidence& evidence, const FlowOptions& options);
+void ask_samples(ChannelVerdict& verdict, const GuardEvidence& evidence, const FlowOptions& options);
+void ask_shared_modes(ChannelVerdict& verdict, const GuardEvidence& evidence, const FlowOptions& options);
 void ask_sweep(ChannelVerdict& verdict, const Result<ChannelSweep>& swept, const FlowOptions& options);
 
 /// The shared modes' figures become the verdict's.
-void take_estimate(ChannelVerdict& verdict, const Evidence& evidence);
+void take_estimate(ChannelVerdict& verdict, const GuardEvidence& evidence);
 
 /// State and reason from the guards.
 void conclude(ChannelVerdict& verdict, double window_end_min, const FlowOptions& options);

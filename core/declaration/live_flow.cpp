@@ -51,7 +51,7 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
         ChannelVerdict channel = begin_verdict(column, verdict.window_end_min);
         const Column& samples = *since.channel(column.name);
         channel.kalman = kalman_prediction(samples.values, since);
-        const Evidence evidence{since, samples, regime, now ? &now->estimate : nullptr, shorter};
+        const GuardEvidence evidence{since, samples, regime, now ? &now->estimate : nullptr, shorter};
         ask_samples(channel, evidence, options_);
         if (channel.state == ChannelState::measuring) {
             take_estimate(channel, evidence);

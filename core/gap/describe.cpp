@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "experiments.hpp"
 #include "root_mean_square.hpp"
 
 namespace thermbal {
@@ -61,6 +62,26 @@ std::vector<std::string> channels_changed(const FitProblem& problem, const Fit& 
     return channels;
 }
 
+/// What would tell the k-th effect from the alternatives that the data leave.
+std::vector<SeparatingExperiment> experiments_against(const Evidence& evidence, const SearchResult& search,
+                                                      std::size_t k,
+                                                      const std::vector<Suspect>& alternatives) {
+    constexpr double least_probability = 0.05;
+    constexpr std::size_t most_rivals = 3;
+    if (std::ranges::none_of(alternatives, [](const Suspect& one) {
+            return !one.kind.empty() && one.probability >= least_probability;
+        }))
+        return {};
+    std::vector<Effect> others = search.current.effects;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+    const auto without =
+        others.empty() ? Result<Explanation>(search.base) : explain(evidence, others, nullptr);
+    if (!without) return {};
+    return separating_experiments(
+        evidence.run, search.current.fit.model,
+        fitted_rivals(evidence, *without, alternatives, least_probability, most_rivals));
+}
+
 }  // namespace
 
 std::vector<Suspect> suspects_of(const Odds& odds, double least) {
@@ -108,6 +129,7 @@ Result<std::vector<FoundEffect>> describe_effects(const Evidence& evidence, cons
         for (std::size_t p = 0; p < one.effect.parameters.size() && p < one.parameters.size(); ++p) {
             one.effect.parameters[p].sigma = one.parameters[p].sigma;
         }
+        one.experiments = experiments_against(evidence, search, k, one.alternatives);
         one.rmse_before_C = root_mean_square(before.fit.point.difference_C);
         one.rmse_after_C = root_mean_square(after.fit.point.difference_C);
         found.push_back(std::move(one));

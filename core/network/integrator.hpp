@@ -65,7 +65,7 @@ class Integrator {
     SimulationOptions options_;
     double start_s_;
     std::vector<double> breaks_s_;
-    std::vector<Regime> regimes_;
+    std::vector<NetworkRegime> regimes_;
     const ModalSystem* system_ = nullptr;
     std::vector<StepFactors> known_factors_;
     std::size_t oldest_factors_ = 0;

@@ -55,12 +55,12 @@ ModalSystem decompose(const CompiledNetwork& network, const Eigen::VectorXd& sur
     return system;
 }
 
-std::vector<Regime> regimes_of(const CompiledNetwork& network) {
+std::vector<NetworkRegime> regimes_of(const CompiledNetwork& network) {
     std::vector<double> from_s = {-std::numeric_limits<double>::infinity()};
     for (const SurfaceChange& change : network.surface_changes) from_s.push_back(change.from_s);
     std::ranges::sort(from_s);
     from_s.erase(std::ranges::unique(from_s).begin(), from_s.end());
-    std::vector<Regime> regimes;
+    std::vector<NetworkRegime> regimes;
     regimes.reserve(from_s.size());
     for (const double from : from_s)
         regimes.push_back({from, decompose(network, surfaces_at(network, from))});

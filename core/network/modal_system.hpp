@@ -27,12 +27,12 @@ struct ModalSystem {
 ModalSystem decompose(const CompiledNetwork& network, const Eigen::VectorXd& surface_W_per_K);
 
 /// The linear part between two changes of a surface, from from_s on.
-struct Regime {
+struct NetworkRegime {
     double from_s;
     ModalSystem system;
 };
 
 /// In the order of time; the first holds from the beginning.
-std::vector<Regime> regimes_of(const CompiledNetwork& network);
+std::vector<NetworkRegime> regimes_of(const CompiledNetwork& network);
 
 }  // namespace thermbal

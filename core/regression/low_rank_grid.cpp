@@ -56,8 +56,8 @@ class GridSearch {
         for (std::size_t sigma = columns_.size(); sigma-- > 0 && !narrower_is_hopeless();) {
             if (auto looked = look_at_column(sigma); !looked) return std::unexpected(looked.error());
         }
-        std::ranges::stable_sort(waiting_, {}, &Candidate::rough_rmse);
-        for (const Candidate& candidate : waiting_) {
+        std::ranges::stable_sort(waiting_, {}, &SigmaCandidate::rough_rmse);
+        for (const SigmaCandidate& candidate : waiting_) {
             if (auto done = cross_validate(candidate); !done) return std::unexpected(done.error());
         }
         return GridChoice{options_.C_grid[best_C_], options_.sigma_grid[best_sigma_], best_mean_mse_};
@@ -68,10 +68,10 @@ class GridSearch {
     Result<void> look_at_column(std::size_t sigma) {
         auto found = columns_[sigma].look_for_candidates(best_mean_mse_, true, cancelled_);
         if (!found) return std::unexpected(found.error());
-        const auto least = std::ranges::min_element(*found, {}, &Candidate::rough_rmse);
+        const auto least = std::ranges::min_element(*found, {}, &SigmaCandidate::rough_rmse);
         least_by_column_.push_back(least->rough_rmse);
         const bool is_least = least->rough_rmse <= std::ranges::min(least_by_column_);
-        const Candidate promising = *least;
+        const SigmaCandidate promising = *least;
         if (is_least) found->erase(least);
         std::ranges::move(*found, std::back_inserter(waiting_));
         return is_least ? cross_validate(promising) : Result<void>{};
@@ -85,7 +85,7 @@ class GridSearch {
                last > least_by_column_[least_by_column_.size() - 2];
     }
 
-    Result<void> cross_validate(const Candidate& candidate) {
+    Result<void> cross_validate(const SigmaCandidate& candidate) {
         let_go_of_others(candidate.sigma_index);
         const auto mse = columns_[candidate.sigma_index].mean_mse(candidate, best_mean_mse_, cancelled_);
         if (!mse) return std::unexpected(mse.error());
@@ -115,7 +115,7 @@ class GridSearch {
     const Cancelled& cancelled_;
     std::vector<Fold> folds_;
     std::vector<SigmaColumn> columns_;
-    std::vector<Candidate> waiting_;
+    std::vector<SigmaCandidate> waiting_;
     std::vector<double> least_by_column_;  ///< from the widest kernel on
     double best_mean_mse_ = std::numeric_limits<double>::infinity();
     std::size_t best_sigma_ = 0;
@@ -138,8 +138,8 @@ Result<std::vector<double>> cross_validate_low_rank(const LagProblem& problem, c
         SigmaColumn column(problem, sigma, folds, options);
         auto candidates = column.look_for_candidates(no_bound, false, cancelled);
         if (!candidates) return std::unexpected(candidates.error());
-        std::ranges::sort(*candidates, {}, &Candidate::C_index);
-        for (const Candidate& candidate : *candidates) {
+        std::ranges::sort(*candidates, {}, &SigmaCandidate::C_index);
+        for (const SigmaCandidate& candidate : *candidates) {
             const auto mse = column.mean_mse(candidate, no_bound, cancelled);
             if (!mse) return std::unexpected(mse.error());
             all.push_back(**mse);

@@ -49,7 +49,7 @@ RoughFit fit_roughly(HeldOutFold& fold, double last_smoothing) {
 /// A candidate's errors fold by fold as they become known.
 class Race {
   public:
-    Race(const Candidate& candidate, std::size_t folds) : rmse_(folds), lowest_(folds) {
+    Race(const SigmaCandidate& candidate, std::size_t folds) : rmse_(folds), lowest_(folds) {
         rmse_[0] = candidate.rough_rmse;
         lowest_[0] = candidate.lowest_rmse;
     }
@@ -91,15 +91,15 @@ SigmaColumn::SigmaColumn(const LagProblem& problem, std::size_t sigma_index, con
       targets_(Eigen::Map<const VectorXd>(problem.targets().data(), static_cast<Index>(problem.rows()))),
       fitted_(folds.size()) {}
 
-Result<std::vector<Candidate>> SigmaColumn::look_for_candidates(double best_mean_mse, bool skip_hopeless,
-                                                                const Cancelled& cancelled) {
+Result<std::vector<SigmaCandidate>> SigmaColumn::look_for_candidates(double best_mean_mse, bool skip_hopeless,
+                                                                     const Cancelled& cancelled) {
     const std::size_t stride = std::max<std::size_t>(1, problem_.rows() / rough_rows);
     rough_ = kernel_features(problem_, sigma_, rough_tolerance_factor * feature_tolerance(sigma_), stride);
     HeldOutFold first(rough_, folds_[0], targets_, options_.epsilon);
     const double hopeless = hopeless_rmse(best_mean_mse, folds_.size());
     TubeSolver::State state = first.solver().cold_start();
     double largest_coefficient = std::numeric_limits<double>::infinity();
-    std::vector<Candidate> candidates;
+    std::vector<SigmaCandidate> candidates;
     for (std::size_t k = options_.C_grid.size(); k-- > 0;) {
         if (cancelled()) return sweep_cancelled();
         const double C = options_.C_grid[k] * static_cast<double>(stride);
@@ -120,7 +120,7 @@ Result<std::vector<Candidate>> SigmaColumn::look_for_candidates(double best_mean
     return candidates;
 }
 
-Result<std::optional<double>> SigmaColumn::mean_mse(const Candidate& candidate, double bound,
+Result<std::optional<double>> SigmaColumn::mean_mse(const SigmaCandidate& candidate, double bound,
                                                     const Cancelled& cancelled) {
     Race race(candidate, folds_.size());
     if (race.is_lost(bound)) return std::nullopt;
@@ -153,7 +153,7 @@ void SigmaColumn::release() {
 }
 
 /// The first fold from where it was roughly, the others from the first.
-void SigmaColumn::start_fold(std::size_t f, const Candidate& candidate) {
+void SigmaColumn::start_fold(std::size_t f, const SigmaCandidate& candidate) {
     const double C = options_.C_grid[candidate.C_index];
     fold(f).start(C, f == 0 ? on_all_rows(candidate.rough_state) : fold(0).solver().state());
 }

@@ -16,7 +16,7 @@
 namespace thermbal {
 
 /// A point of the grid after a rough fit of its first fold.
-struct Candidate {
+struct SigmaCandidate {
     std::size_t sigma_index = 0;
     std::size_t C_index = 0;
     double rough_rmse = 0.0;
@@ -37,11 +37,11 @@ class SigmaColumn {
     /// The first fold roughly, from the largest C down, each from the one before; with `skip_hopeless` no
     /// further than where the error is hopeless and grows. At least one candidate. Error: stop when
     /// cancelled.
-    Result<std::vector<Candidate>> look_for_candidates(double best_mean_mse, bool skip_hopeless,
-                                                       const Cancelled& cancelled);
+    Result<std::vector<SigmaCandidate>> look_for_candidates(double best_mean_mse, bool skip_hopeless,
+                                                            const Cancelled& cancelled);
 
     /// The mean over folds, or nothing as soon as it is sure to be above `bound`. Error: stop when cancelled.
-    Result<std::optional<double>> mean_mse(const Candidate& candidate, double bound,
+    Result<std::optional<double>> mean_mse(const SigmaCandidate& candidate, double bound,
                                            const Cancelled& cancelled);
 
     /// What is kept between calls of mean_mse(), in numbers; and lets go of it: the next call makes it again.
@@ -52,7 +52,7 @@ class SigmaColumn {
     const KernelFeatures& kernel();
     HeldOutFold& fold(std::size_t f);
     TubeSolver::State on_all_rows(const TubeSolver::State& rough);
-    void start_fold(std::size_t f, const Candidate& candidate);
+    void start_fold(std::size_t f, const SigmaCandidate& candidate);
 
     const LagProblem& problem_;
     std::size_t sigma_index_;

@@ -119,6 +119,15 @@ std::unexpected<Error> refuse(std::string_view name, std::size_t line, std::size
 
 }  // namespace
 
+bool is_input_name(std::string_view name) {
+    const auto is_letter = [](char c) {
+        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
+    };
+    const auto fits = [&](char c) { return is_letter(c) || (c >= '0' && c <= '9'); };
+    return !name.empty() && name.size() <= 64 && is_letter(name.front()) && std::ranges::all_of(name, fits) &&
+           !is_channel_name(name) && name != "time_s";
+}
+
 Result<RecordedTest> parse_recorded_test(std::string_view csv_text, std::string_view name) {
     CsvReader reader(csv_text);
     while (reader.at_comment()) reader.skip_line();

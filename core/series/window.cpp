@@ -80,6 +80,13 @@ TestWindow to_window(const RecordedTest& test, double period_s) {
     return window;
 }
 
+RecordedTest recording_of(const TestWindow& window) {
+    RecordedTest test{{}, window.channels, window.inputs};
+    test.time_s.reserve(window.scans);
+    for (std::size_t scan = 0; scan < window.scans; ++scan) test.time_s.push_back(window.time_s(scan));
+    return test;
+}
+
 TestWindow window_until(const TestWindow& window, double until_s) {
     const double scans = std::floor((until_s - window.start_s) / window.period_s + grid_slack) + 1.0;
     const auto count = static_cast<std::size_t>(std::clamp(scans, 0.0, static_cast<double>(window.scans)));

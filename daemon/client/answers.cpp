@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <ctime>
 #include <utility>
 
@@ -86,6 +87,40 @@ std::string value_or_quality(const json& sample, bool is_short) {
     return quality.empty() ? "-" : quality;
 }
 
+namespace {
+
+std::string inputs_text(const json& inputs) {
+    std::vector<std::string> texts;
+    for (const auto& [name, value] : inputs.items()) {
+        if (value.is_number()) texts.push_back(fmt::format("{} = {:g}", name, value.get<double>()));
+    }
+    return fmt::format("{}", fmt::join(texts, ", "));
+}
+
+/// "\"spindle head\": agrees, largest residual T5 +0.12 C at 62.25 min".
+std::string model_text(const json& model) {
+    std::string line = fmt::format("\"{}\": {}", text(model, "name"), text(model, "state"));
+    std::vector<std::string> apart;
+    const json* largest = nullptr;
+    for (const json& channel : list(model, "channels")) {
+        if (flag(channel, "disagrees")) apart.push_back(text(channel, "channel"));
+        const auto residual_C = number(channel, "residual_C");
+        if (!residual_C) continue;
+        if (largest == nullptr || std::abs(*residual_C) > std::abs(*number(*largest, "residual_C")))
+            largest = &channel;
+    }
+    if (!apart.empty()) line += fmt::format(" at {}", fmt::join(apart, ", "));
+    if (const std::string problem = text(model, "problem"); !problem.empty()) line += ": " + problem;
+    if (largest != nullptr) {
+        line += fmt::format(", largest residual {} {} C at {} min", text(*largest, "channel"),
+                            with_sign(number(*largest, "residual_C"), 2),
+                            fixed(number(model, "compared_at_min"), 2));
+    }
+    return line;
+}
+
+}  // namespace
+
 std::string status_text(const json& status) {
     Facts facts;
     facts.add("state", or_dash(text(status, "state")));
@@ -103,6 +138,9 @@ std::string status_text(const json& status) {
             facts.add("identified", fmt::format("at {:.2f} min, took {} s", *at_min,
                                                 fixed(number(test, "identification_s"), 2)));
         }
+        facts.add("inputs", inputs_text(object_in(test, "inputs")));
+        if (const json& model = object_in(test, "model"); !model.empty())
+            facts.add("model", model_text(model));
     } else {
         facts.add("test", "none yet: thermbalctl start");
     }

@@ -1,11 +1,15 @@
 #include "ask.hpp"
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 
 #include <fmt/format.h>
 
 #include "answers.hpp"
+#include "columns.hpp"
 #include "fields.hpp"
+#include "files.hpp"
 #include "output.hpp"
 #include "socket_client.hpp"
 
@@ -36,8 +40,27 @@ json without_empty(json params) {
     return params;
 }
 
+/// {"spindle_rpm": 5000.0} from "spindle_rpm=5000".
+Result<json> inputs_in(const std::vector<std::string>& texts) {
+    json inputs = json::object();
+    for (const std::string& text : texts) {
+        const std::size_t equals = text.find('=');
+        const std::string digits = equals == std::string::npos ? "" : text.substr(equals + 1);
+        double value = 0.0;
+        const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+        if (code != std::errc() || end != digits.data() + digits.size() || !std::isfinite(value)) {
+            return fail(NextStep::refuse_input,
+                        fmt::format("input: found \"{}\"; accepted: NAME=NUMBER, spindle_rpm=5000", text));
+        }
+        inputs[text.substr(0, equals)] = value;
+    }
+    return inputs;
+}
+
 std::string test_text(const json& answer) {
-    return fmt::format("test {} is {}\n", fixed(number(answer, "test"), 0), text(answer, "state"));
+    const std::string model = text(answer, "model");
+    return fmt::format("test {} is {}{}\n", fixed(number(answer, "test"), 0), text(answer, "state"),
+                       model.empty() ? "" : fmt::format(", compared with model \"{}\"", printable(model)));
 }
 
 std::int64_t newest_id(const json& events, std::int64_t otherwise) {
@@ -97,8 +120,26 @@ int run_health(const AskOptions& ask) {
     return ask_and_print(ask, "health", json::object(), health_text);
 }
 
-int run_start(const AskOptions& ask, const std::string& name, const std::string& machine) {
-    return ask_and_print(ask, "start_test", without_empty({{"name", name}, {"machine", machine}}), test_text);
+int run_start(const AskOptions& ask, const StartOptions& options) {
+    json params = without_empty({{"name", options.name}, {"machine", options.machine}});
+    const auto inputs = inputs_in(options.inputs);
+    if (!inputs) return report_error(inputs.error());
+    if (!inputs->empty()) params["inputs"] = *inputs;
+    if (!options.model.empty()) {
+        // Its text travels: the daemon may not read where the person may.
+        const auto toml = read_file(options.model);
+        if (!toml) return report_error(toml.error());
+        params["model"] = *toml;
+        params["model_file"] = options.model;
+    }
+    return ask_and_print(ask, "start_test", params, test_text);
+}
+
+int run_inputs(const AskOptions& ask, const std::vector<std::string>& texts) {
+    const auto inputs = inputs_in(texts);
+    if (!inputs) return report_error(inputs.error());
+    return ask_and_print(ask, "set_inputs", {{"inputs", *inputs}},
+                         [](const json&) { return std::string("noted\n"); });
 }
 
 int run_stop(const AskOptions& ask, const std::string& reason, bool abort) {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace thermbal {
 
@@ -21,7 +22,15 @@ int run_channels(const AskOptions& ask);
 int run_predictions(const AskOptions& ask);
 int run_health(const AskOptions& ask);
 
-int run_start(const AskOptions& ask, const std::string& name, const std::string& machine);
+struct StartOptions {
+    std::string name;  ///< empty, as the rest: as configured
+    std::string machine;
+    std::string model;                ///< file of the simulation that the test is compared with
+    std::vector<std::string> inputs;  ///< "spindle_rpm=5000"
+};
+int run_start(const AskOptions& ask, const StartOptions& options);
+/// Known inputs have other values from the next scan on: "spindle_rpm=3000".
+int run_inputs(const AskOptions& ask, const std::vector<std::string>& inputs);
 int run_stop(const AskOptions& ask, const std::string& reason, bool abort);
 int run_annotate(const AskOptions& ask, const std::string& message, const std::string& channel);
 

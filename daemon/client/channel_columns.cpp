@@ -56,6 +56,11 @@ ChannelCell n_cell(const json& channel, std::size_t /*width*/) {
     return {n && *n > 0 ? fixed(n, 0) : "-", Ink::plain};
 }
 
+/// Measured less simulated; red where that cannot be noise and the model's own limits.
+ChannelCell residual_cell(const json& channel, std::size_t /*width*/) {
+    return {with_sign(number(channel, "residual_C"), 2), flag(channel, "disagrees") ? Ink::bad : Ink::plain};
+}
+
 std::vector<ChannelColumn> all_columns(bool unicode) {
     const auto field = [](const char* key) {
         return
@@ -74,6 +79,7 @@ std::vector<ChannelColumn> all_columns(bool unicode) {
          [](const json& channel, std::size_t) {
              return ChannelCell{with_sign(current(channel, "rate_C_per_h"), 1), Ink::plain};
          }},
+        {"resid C", 7, 7, 2, true, residual_cell},
         {"trend", 7, 24, 5, false,
          [unicode](const json& channel, std::size_t width) {
              return ChannelCell{sparkline(list(channel, "recent_C"), width, unicode),
@@ -116,6 +122,10 @@ std::vector<ChannelColumn> fitting_columns(const json& channels, std::size_t wid
         std::ranges::any_of(channels, [](const json& channel) { return !text(channel, "place").empty(); });
     if (!has_places)
         std::erase_if(columns, [](const ChannelColumn& column) { return column.title == "place"; });
+    const bool is_compared =
+        std::ranges::any_of(channels, [](const json& channel) { return channel.contains("residual_C"); });
+    if (!is_compared)
+        std::erase_if(columns, [](const ChannelColumn& column) { return column.title == "resid C"; });
     while (total_width(columns) > width) {
         const auto least = std::ranges::max_element(columns, {}, &ChannelColumn::rank);
         if (least->rank == 0) break;

@@ -2,7 +2,12 @@
 
 #include <CLI/CLI.hpp>
 
+#include "database.hpp"
+
 namespace thermbal {
+
+/// --database and --socket: the database by name, or else by the daemon that answers on the socket.
+void add_database_flags(CLI::App& command, DatabaseOptions& options);
 
 // Each adds subcommands to the program; parsing runs what was asked for, and leaves its exit status in
 // `status`.
@@ -22,7 +27,7 @@ void add_demo_command(CLI::App& app, int& status);
 void add_metrics_command(CLI::App& app, int& status);
 /// probe.
 void add_probe_command(CLI::App& app, int& status);
-/// simulate, calibrate.
+/// simulate, calibrate, diagnose.
 void add_model_commands(CLI::App& app, int& status);
 
 }  // namespace thermbal

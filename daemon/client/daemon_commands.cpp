@@ -107,12 +107,22 @@ void add_events(CLI::App& app, int& status) {
 
 void add_start(CLI::App& app, int& status) {
     const Command command = add_command(app, "start", "start a test (operators only)");
-    const auto name = keep<std::string>();
-    const auto machine = keep<std::string>();
-    command.app->add_option("--name", *name, "name of the test; otherwise as configured");
-    command.app->add_option("--machine", *machine, "the machine under test; otherwise as configured");
-    command.app->callback(
-        [&status, ask = command.ask, name, machine] { status = run_start(*ask, *name, *machine); });
+    const auto options = keep<StartOptions>();
+    command.app->add_option("--name", options->name, "name of the test; otherwise as configured");
+    command.app->add_option("--machine", options->machine, "the machine under test; otherwise as configured");
+    command.app->add_option("--model", options->model,
+                            "simulation model (TOML) that the test is compared with while it runs");
+    command.app->add_option("--input", options->inputs,
+                            "a known input, spindle_rpm=5000; may be given several times");
+    command.app->callback([&status, ask = command.ask, options] { status = run_start(*ask, *options); });
+}
+
+void add_inputs(CLI::App& app, int& status) {
+    const Command command =
+        add_command(app, "inputs", "known inputs have other values from now on (operators only)");
+    const auto inputs = keep<std::vector<std::string>>();
+    command.app->add_option("NAME=VALUE", *inputs, "spindle_rpm=3000")->required();
+    command.app->callback([&status, ask = command.ask, inputs] { status = run_inputs(*ask, *inputs); });
 }
 
 void add_stop(CLI::App& app, int& status) {
@@ -149,6 +159,7 @@ void add_daemon_commands(CLI::App& app, int& status) {
     add_events(app, status);
     add_simple(app, status, "health", "scans, lines, commits, identification, memory", run_health);
     add_start(app, status);
+    add_inputs(app, status);
     add_stop(app, status);
     add_annotate(app, status);
 }

@@ -20,15 +20,6 @@ void add_json_flag(CLI::App& command, bool& json) {
     command.add_flag("--json", json, "one JSON document on standard output");
 }
 
-/// The database by name, or else by the daemon that answers on the socket.
-void add_database_flags(CLI::App& command, DatabaseOptions& options) {
-    command.add_option("--database", options.database, "the database; without it the running daemon's own")
-        ->check(CLI::ExistingFile);
-    command.add_option("--socket", options.ask.socket, "the daemon's Unix socket")
-        ->capture_default_str()
-        ->envname("THERMBAL_SOCKET");
-}
-
 void add_tests(CLI::App& app, int& status) {
     CLI::App& command = add_command(app, "tests", "the stored tests, newest first");
     const auto options = std::make_shared<DatabaseOptions>();
@@ -91,6 +82,14 @@ void add_ports(CLI::App& app, int& status) {
 }
 
 }  // namespace
+
+void add_database_flags(CLI::App& command, DatabaseOptions& options) {
+    command.add_option("--database", options.database, "the database; without it the running daemon's own")
+        ->check(CLI::ExistingFile);
+    command.add_option("--socket", options.ask.socket, "the daemon's Unix socket")
+        ->capture_default_str()
+        ->envname("THERMBAL_SOCKET");
+}
 
 void add_database_commands(CLI::App& app, int& status) {
     add_tests(app, status);

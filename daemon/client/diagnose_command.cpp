@@ -15,11 +15,47 @@
 namespace thermbal {
 namespace {
 
-Result<Diagnosis> diagnosed(const DiagnoseCommand& command) {
-    const auto model = read_model(command.model);
-    if (!model) return std::unexpected(model.error());
-    const auto test = read_recorded_test(command.file);
+/// What is to be diagnosed.
+struct Subject {
+    std::string name;
+    RecordedTest test;
+    Model model;
+};
+
+Result<Model> model_of(const DiagnoseCommand& command, const StoredTest& test) {
+    if (!command.model.empty()) return read_model(command.model);
+    if (test.record.model_toml.empty()) {
+        return fail(NextStep::refuse_input,
+                    fmt::format("test {} was compared with no model; name one with --model", test.id));
+    }
+    return load_model(test.record.model_toml,
+                      fmt::format("test {}, stored from {}", test.id, test.record.model_file));
+}
+
+Result<Subject> stored_subject(const DiagnoseCommand& command) {
+    const auto reader = open_database(command.database);
+    if (!reader) return std::unexpected(reader.error());
+    const auto test = reader->test(*command.test);
     if (!test) return std::unexpected(test.error());
+    auto model = model_of(command, *test);
+    if (!model) return std::unexpected(model.error());
+    auto recorded = reader->recorded_test(test->id);
+    if (!recorded) return std::unexpected(recorded.error());
+    return Subject{fmt::format("test {} of {}", test->id, reader->path().string()), std::move(*recorded),
+                   std::move(*model)};
+}
+
+Result<Subject> recorded_subject(const DiagnoseCommand& command) {
+    auto model = read_model(command.model);
+    if (!model) return std::unexpected(model.error());
+    auto test = read_recorded_test(command.file);
+    if (!test) return std::unexpected(test.error());
+    return Subject{command.file, std::move(*test), std::move(*model)};
+}
+
+Result<Diagnosis> diagnosed(const DiagnoseCommand& command) {
+    const auto subject = command.test ? stored_subject(command) : recorded_subject(command);
+    if (!subject) return std::unexpected(subject.error());
     std::vector<Holdout> holdouts;
     for (const std::string& file : command.holdouts) {
         auto held = read_recorded_test(file);
@@ -27,16 +63,16 @@ Result<Diagnosis> diagnosed(const DiagnoseCommand& command) {
         holdouts.push_back({file, std::move(*held)});
     }
     DiagnoseOptions options;
-    options.found_on = command.file;
+    options.found_on = subject->name;
     Progress progress("diagnose");
-    return diagnose(*model, *test, holdouts, options,
+    return diagnose(subject->model, subject->test, holdouts, options,
                     progress.counting(parallel_on_threads(command.threads, false)));
 }
 
 Result<void> write_results(const DiagnoseCommand& command, const Diagnosis& diagnosis) {
     if (!command.write_model.empty()) {
         const auto comment =
-            fmt::format("Found by thermbalctl diagnose on {}: {}", command.file, diagnosis.reason);
+            fmt::format("Found by thermbalctl diagnose on {}: {}", diagnosis.run.name, diagnosis.reason);
         if (auto done = write_file(command.write_model, write_model(diagnosis.extended, comment)); !done)
             return done;
     }
@@ -59,6 +95,11 @@ void print_text(const Diagnosis& diagnosis) {
                        other.kind.empty() ? "something without a name" : other.kind, other.at,
                        100.0 * other.probability);
         }
+        for (const SeparatingExperiment* one : clearest_experiments(found)) {
+            if (one->separates)
+                fmt::print("  to tell it from {} at {}: {}; {} would differ by {:.2f} C\n", one->against,
+                           one->against_at, in_words(one->kind), one->channel, one->difference_C);
+        }
     }
     for (const ResidualHeat& heat : diagnosis.residual_heat) {
         fmt::print("what is missing looks like {} at {}, {:.0f} to {:.0f} min, following {}\n",
@@ -74,11 +115,8 @@ int run_diagnose(const DiagnoseCommand& command) {
     if (!diagnosis) return report_error(diagnosis.error());
     if (const auto written = write_results(command, *diagnosis); !written)
         return report_error(written.error());
-    if (command.json) {
-        fmt::print("{}\n", diagnosis_to_json(*diagnosis).dump(2));
-    } else {
-        print_text(*diagnosis);
-    }
+    if (command.json) return print_json(diagnosis_to_json(*diagnosis));
+    print_text(*diagnosis);
     return 0;
 }
 

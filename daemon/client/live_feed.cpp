@@ -32,7 +32,8 @@ Result<void> LiveFeed::open() {
 
 Result<void> LiveFeed::fill() {
     // Subscribed first: a scan between the two comes twice rather than not at all.
-    if (auto subscribed = client_->subscribe({"scan", "predictions", "event", "status"}); !subscribed)
+    if (auto subscribed = client_->subscribe({"scan", "predictions", "event", "status", "comparison"});
+        !subscribed)
         return subscribed;
     auto status = client_->ask("status", json::object(), answer_limit);
     if (!status) return std::unexpected(status.error());
@@ -122,7 +123,8 @@ std::vector<Notification> LiveFeed::update() {
         if (is_older && (*next)->topic != "event") continue;
         take(**next);
         scanned = scanned || (*next)->topic == "scan";
-        identified = identified || (*next)->topic == "predictions";
+        // The figures of a comparison are of the scan before it, and stand in its channels.
+        identified = identified || (*next)->topic == "predictions" || (*next)->topic == "comparison";
         taken.push_back(std::move(**next));
     }
     // Neither the state nor, after an identification, the verdicts are in the notifications.

@@ -51,8 +51,16 @@ void add_diagnose(CLI::App& app, int& status) {
     CLI::App& diagnose_command = *app.add_subcommand(
         "diagnose", "where a model and a recorded test disagree, and what effect the model lacks");
     diagnose_command.group(group);
-    diagnose_command.add_option("FILE", diagnose->file, "recorded test: CSV")->required();
-    diagnose_command.add_option("--model", diagnose->model, "simulation model: TOML")->required();
+    auto* const file = diagnose_command.add_option("FILE", diagnose->file, "recorded test: CSV");
+    auto* const test =
+        diagnose_command
+            .add_option("--test", diagnose->test, "instead: id of a stored test (see thermbalctl tests)")
+            ->check(CLI::PositiveNumber)
+            ->excludes(file);
+    auto* const model = diagnose_command.add_option(
+        "--model", diagnose->model,
+        "simulation model: TOML; of a stored test without it the one that it was compared with");
+    add_database_flags(diagnose_command, diagnose->database);
     diagnose_command.add_option("--holdout", diagnose->holdouts,
                                 "another run of the machine, never fitted; may be given several times");
     diagnose_command.add_option("--write-model", diagnose->write_model,
@@ -62,7 +70,12 @@ void add_diagnose(CLI::App& app, int& status) {
         ->capture_default_str()
         ->check(CLI::Range(1, 256));
     diagnose_command.add_flag("--json", diagnose->json, "one JSON document on standard output");
-    diagnose_command.callback([&status, diagnose] { status = run_diagnose(*diagnose); });
+    diagnose_command.callback([&status, diagnose, file, test, model] {
+        if (file->empty() && test->empty())
+            throw CLI::ValidationError("diagnose", "what? give a recorded test, or --test ID");
+        if (test->empty() && model->empty()) throw CLI::RequiredError("--model");
+        status = run_diagnose(*diagnose);
+    });
 }
 
 }  // namespace

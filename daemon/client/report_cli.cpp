@@ -16,13 +16,7 @@ void add_report_command(CLI::App& app, int& status) {
     auto* const out =
         command.add_option("--out", options->out, "HTML file to write, or - for standard output");
     command.add_flag("--json", options->json, "the same as one JSON document on standard output");
-    command
-        .add_option("--database", options->database.database,
-                    "the database; without it the running daemon's own")
-        ->check(CLI::ExistingFile);
-    command.add_option("--socket", options->database.ask.socket, "the daemon's Unix socket")
-        ->capture_default_str()
-        ->envname("THERMBAL_SOCKET");
+    add_database_flags(command, options->database);
     command
         .add_option("--ambient", options->recording.ambient,
                     "of a file: channel that measures the room, or none")

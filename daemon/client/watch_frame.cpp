@@ -301,6 +301,13 @@ void put_channel_facts(Frame& frame, const json& channel) {
          declared ? Ink::good_bold : Ink::plain);
     fact("95 %", fmt::format("at {}   {} left", minutes(number(channel, "equilibrium_time_min")),
                              minutes(number(channel, "time_left_min"))));
+    if (const auto residual_C = number(channel, "residual_C")) {
+        fact("simulated",
+             fmt::format("{} C   measured is {} C off{}", fixed(number(channel, "simulated_C"), 2),
+                         with_sign(residual_C, 2),
+                         flag(channel, "disagrees") ? ": more than noise and model allow" : ""),
+             flag(channel, "disagrees") ? Ink::bad : Ink::plain);
+    }
     fact("state", state_name(channel) + (flag(channel, "required") ? "" : ", not required"),
          declared ? Ink::good_bold : Ink::plain);
     fact("reason", text(channel, "reason"));
@@ -343,6 +350,8 @@ void put_help_page(Frame& frame) {
     put_rule(frame, "what is shown");
     entry("12.34", "declared: it settles here, proved, in its 90 % interval", Ink::good_bold);
     entry("12.34", "the newest estimate: not proved yet, it may still move", Ink::dim);
+    entry("resid C", "measured less simulated by the test's model; red: more than noise and model allow",
+          Ink::dim);
     entry("open, gap ...", "no reading: never a number that the sensor did not send", Ink::bad);
     entry("left", "time until 95 % of the rise", Ink::dim);
     entry("n, RMSE", "lags of the regression, and its error over the window", Ink::dim);

@@ -43,7 +43,10 @@ json effect_to_json(const FoundEffect& found) {
     json experiments = json::array();
     for (const SeparatingExperiment& one : found.experiments) {
         experiments.push_back({{"against", one.against},
-                               {"experiment", one.experiment},
+                               {"against_at", one.against_at},
+                               {"kind", to_string(one.kind)},
+                               {"experiment", in_words(one.kind)},
+                               {"separates", one.separates},
                                {"channel", one.channel},
                                {"difference_C", number_or_null(one.difference_C)},
                                {"sigmas", number_or_null(one.sigmas)}});

@@ -1,10 +1,14 @@
 #include "report/gap_report.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numeric>
 
 #include <fmt/format.h>
 
 #include "network/effect.hpp"
+#include "quantity.hpp"
 #include "report/html.hpp"
 #include "report/page.hpp"
 
@@ -36,8 +40,34 @@ std::string number_in_words(const CalibratedParameter& number) {
     constexpr double z90 = 1.645;
     const Parameter& p = number.parameter;
     const double at = p.to_coordinate(number.value);
-    return fmt::format("{} {:.3g} ({:.3g} to {:.3g})", p.name.substr(p.name.rfind('.') + 1), number.value,
-                       p.to_value(at - z90 * number.sigma), p.to_value(at + z90 * number.sigma));
+    return quantity_in_words(p.name.substr(p.name.rfind('.') + 1), number.value,
+                             p.to_value(at - z90 * number.sigma), p.to_value(at + z90 * number.sigma));
+}
+
+std::string as_a_sentence(std::string words) {
+    if (!words.empty() && words.front() >= 'a' && words.front() <= 'z')
+        words.front() = static_cast<char>(words.front() - 'a' + 'A');
+    return words;
+}
+
+/// What a manager asks first: how far off, how far off now, how much of it is gone.
+std::string gap_facts(const Diagnosis& diagnosis) {
+    const auto fact = [](const std::string& value, const std::string& what) {
+        return fmt::format("<div><b>{}</b><span>{}</span></div>", value, what);
+    };
+    const bool held_out = !diagnosis.holdouts.empty();
+    const RunComparison& run = held_out ? diagnosis.holdouts.front() : diagnosis.run;
+    const char* where = held_out ? "on a run that was never fitted" : "on this run";
+    std::string html = "<div class=\"facts\">";
+    html += fact(fmt::format("{:.2f} &deg;C", run.before_rmse_C),
+                 fmt::format("gap of the simulation, {}", where));
+    if (diagnosis.effects.empty()) return html + "</div>";
+    html += fact(fmt::format("{:.2f} &deg;C", run.after_rmse_C), "gap with what was found");
+    if (run.before_rmse_C > 0.0 && run.after_rmse_C < run.before_rmse_C) {
+        html += fact(fmt::format("{:.0f} %", 100.0 * (1.0 - run.after_rmse_C / run.before_rmse_C)),
+                     "of the gap is gone; noise never goes");
+    }
+    return html + "</div>";
 }
 
 std::string gap_table(const Diagnosis& diagnosis) {
@@ -66,19 +96,35 @@ std::string evidence_table(const std::vector<Suspect>& suspects, const FoundEffe
     return html + "</table></div>";
 }
 
+/// For each look-alike the clearest experiment, or that none would tell.
+std::string experiments_list(const FoundEffect& found) {
+    if (found.experiments.empty()) return {};
+    std::string html = "<h4>What would settle it</h4><ul>";
+    for (const SeparatingExperiment* one : clearest_experiments(found)) {
+        const std::string rival =
+            plain_kind(one->against) + (one->against_at.empty() ? "" : ", at " + one->against_at);
+        const std::string answer =
+            one->separates
+                ? fmt::format("{}. There {} would read {:.2f} &deg;C otherwise.",
+                              escaped(std::string(in_words(one->kind))), escaped(one->channel),
+                              one->difference_C)
+                : "no cool-down, second speed or change of the room's temperature of this length would tell; "
+                  "look at the machine.";
+        html += fmt::format("<li>Against <q>{}</q>: {}</li>", escaped(rival), answer);
+    }
+    return html + "</ul>";
+}
+
 std::string effect_section(const FoundEffect& found) {
     std::string html = fmt::format(
-        "<div class=\"card\"><h3>{}</h3><p>Gap {:.3f} &deg;C before, {:.3f} &deg;C after.</p><ul>",
-        escaped(effect_in_words(found)), found.rmse_before_C, found.rmse_after_C);
+        "<div class=\"card\"><h3>{}</h3><p>With it the gap of the fitted run falls from {:.3f} to {:.3f} "
+        "&deg;C. "
+        "Its numbers, with their 90 % intervals:</p><ul>",
+        escaped(as_a_sentence(effect_in_words(found))), found.rmse_before_C, found.rmse_after_C);
     for (const CalibratedParameter& number : found.parameters)
         html += "<li>" + escaped(number_in_words(number)) + "</li>";
     html += "</ul>" + evidence_table(found.alternatives, &found);
-    for (const SeparatingExperiment& one : found.experiments) {
-        html += fmt::format("<p>To tell it from {}: {}; {} would differ by {:.2f} &deg;C.</p>",
-                            escaped(plain_kind(one.against)), escaped(one.experiment), escaped(one.channel),
-                            one.difference_C);
-    }
-    return html + "</div>";
+    return html + experiments_list(found) + "</div>";
 }
 
 /// A run's channels, measured and simulated without and with the effects.
@@ -101,12 +147,22 @@ PlotTable run_table(const RunComparison& run, const std::string& name) {
     return thinned(std::move(table), pixels_of_a_screen);
 }
 
+std::vector<std::size_t> largest_gap_first(const RunComparison& run) {
+    std::vector<std::size_t> order(run.channels.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, std::ranges::greater{}, [&](std::size_t c) {
+        return run.channel_before_rmse_C(static_cast<Eigen::Index>(c));
+    });
+    return order;
+}
+
 std::string run_section(const RunComparison& run, const char* what, std::size_t index, Page& page) {
     const std::string table = fmt::format("run{}", index);
     page.add_table(run_table(run, table));
-    std::string html =
-        fmt::format("<h2>{} <small>{}</small></h2><div class=\"plots\">", escaped(run.name), what);
-    for (std::size_t c = 0; c < run.channels.size(); ++c) {
+    std::string html = fmt::format(
+        "<h2>{} <small>{}; the channel with the largest gap first</small></h2><div class=\"plots\">",
+        escaped(run.name), what);
+    for (const std::size_t c : largest_gap_first(run)) {
         const std::string& channel = run.channels[c];
         const auto k = static_cast<Eigen::Index>(c);
         html +=
@@ -145,20 +201,23 @@ std::string residual_heat_figure(const ResidualHeat& heat, std::size_t index, Pa
     return "<div class=\"card\">" +
            page.figure({.id = name,
                         .title = fmt::format("{} {}: {:.0f} to {:.0f} min, follows {}",
-                                             heat.of_sensor ? "error of sensor" : "heat into", heat.at,
+                                             heat.of_sensor ? "Error of sensor" : "Heat into", heat.at,
                                              heat.from_s / 60.0, heat.to_s / 60.0, heat.follows),
                         .table = name,
                         .unit = heat.of_sensor ? "°C" : "W",
-                        .lines = {{"course", "course", "accent"},
-                                  {"2 standard deviations below", "low", "muted"},
-                                  {"above", "high", "muted"}},
+                        .lines = {{"course", "course", "accent"}},
                         .bands = {{"low", "high", "accent"}}}) +
            "</div>";
 }
 
 std::string residual_heat_section(const Diagnosis& diagnosis, Page& page) {
     if (diagnosis.residual_heat.empty()) return {};
-    std::string html = "<h2>Where and when, before any name</h2><div class=\"plots\">";
+    std::string html =
+        "<h2>Where and when something is missing</h2><p class=\"quiet\">Before any name: heat (or an error "
+        "of a "
+        "sensor) of this course at this one place would close most of the gap. The likeliest place first; "
+        "the "
+        "band is two standard deviations.</p><div class=\"plots\">";
     for (std::size_t i = 0; i < diagnosis.residual_heat.size(); ++i)
         html += residual_heat_figure(diagnosis.residual_heat[i], i, page);
     return html + "</div>";
@@ -174,13 +233,24 @@ std::string effect_in_words(const FoundEffect& found) {
     return words;
 }
 
+std::vector<const SeparatingExperiment*> clearest_experiments(const FoundEffect& found) {
+    std::vector<const SeparatingExperiment*> clearest;
+    for (const SeparatingExperiment& one : found.experiments) {
+        const bool same = !clearest.empty() && clearest.back()->against == one.against &&
+                          clearest.back()->against_at == one.against_at;
+        if (!same) clearest.push_back(&one);
+    }
+    return clearest;
+}
+
 std::string gap_report_html(const Diagnosis& diagnosis) {
     Page page("Simulation and measurement");
     const bool rest =
         diagnosis.verdict == GapVerdict::unexplained || diagnosis.verdict == GapVerdict::partly_explained;
-    page.add(fmt::format("<div class=\"verdict{}\"><h1>{}</h1><p class=\"quiet\">{}</p></div>",
-                         rest ? " open" : "", verdict_in_words(diagnosis), escaped(diagnosis.reason)));
-    page.add("<h2>The gap</h2>" + gap_table(diagnosis));
+    page.add(fmt::format("<div class=\"verdict{}\"><h1>{}</h1><p class=\"quiet\">{}</p>{}</div>",
+                         rest ? " open" : "", verdict_in_words(diagnosis),
+                         escaped(as_a_sentence(diagnosis.reason)), gap_facts(diagnosis)));
+    page.add("<h2>The gap, run by run</h2>" + gap_table(diagnosis));
     if (!diagnosis.effects.empty()) page.add("<h2>What was missing</h2>");
     for (const FoundEffect& found : diagnosis.effects) page.add(effect_section(found));
     if (rest) page.add("<h2>What is left over</h2>" + evidence_table(diagnosis.suspects, nullptr));

@@ -81,6 +81,10 @@ std::pair<double, double> value_range(const Plot& plot, const PlotTable& table) 
     constexpr double infinity = std::numeric_limits<double>::infinity();
     std::pair range{infinity, -infinity};
     for (const PlotLine& line : plot.lines) widen(range, table, line.column);
+    for (const PlotBand& band : plot.bands) {
+        widen(range, table, band.low);
+        widen(range, table, band.high);
+    }
     for (const PlotStrip& strip : plot.strips) {
         widen(range, strip.low);
         widen(range, strip.high);

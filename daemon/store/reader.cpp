@@ -20,7 +20,7 @@ constexpr std::int64_t most_scans = 10'000'000;
 
 constexpr std::string_view test_columns =
     "SELECT id, name, machine, config_toml, version, period_s, keep_measuring, state, started_wall_ns, "
-    "started_monotonic_ns, boot_id, ended_wall_ns, ended_monotonic_ns, stop_reason, "
+    "started_monotonic_ns, boot_id, ended_wall_ns, ended_monotonic_ns, stop_reason, model_toml, model_file, "
     "(SELECT max(scan) FROM scans WHERE test_id = tests.id) FROM tests ";
 
 StoredTest test_in(const sqlite::Statement& row) {
@@ -37,7 +37,9 @@ StoredTest test_in(const sqlite::Statement& row) {
     test.record.boot_id = row.text(10);
     if (!row.null(11)) test.ended = Moment{row.integer(11), row.integer(12)};
     test.stop_reason = row.text(13);
-    test.last_scan = row.optional_integer(14);
+    test.record.model_toml = row.text(14);
+    test.record.model_file = row.text(15);
+    test.last_scan = row.optional_integer(16);
     return test;
 }
 

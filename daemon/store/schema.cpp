@@ -261,7 +261,13 @@ CREATE VIEW event_log AS
   FROM events e LEFT JOIN tests t ON t.id = e.test_id;
 )sql";
 
-constexpr std::array steps = {version_1, version_2, version_3, version_4, version_5};
+// The simulation that a test is compared with, as it was given.
+constexpr const char* version_6 = R"sql(
+ALTER TABLE tests ADD COLUMN model_toml TEXT NOT NULL DEFAULT '';
+ALTER TABLE tests ADD COLUMN model_file TEXT NOT NULL DEFAULT '';
+)sql";
+
+constexpr std::array steps = {version_1, version_2, version_3, version_4, version_5, version_6};
 
 }  // namespace
 

@@ -303,14 +303,15 @@ Result<TestId> Store::begin_test(const TestRecord& test, std::optional<TestId> w
                                 (*open_test)->record.name, to_string((*open_test)->state)));
     TestId id = 0;
     auto done = in_transaction(database, [&]() -> Result<void> {
-        if (auto inserted = database.run("INSERT INTO tests (id, name, machine, config_toml, version, "
-                                         "period_s, keep_measuring, state, "
-                                         "started_wall_ns, started_monotonic_ns, boot_id) VALUES (?, ?, ?, "
-                                         "?, ?, ?, ?, 'running', ?, ?, "
-                                         "?)",
-                                         wanted_id, test.name, test.machine, test.config_toml, test.version,
-                                         test.period_s, test.keep_measuring, test.started.wall_ns,
-                                         test.started.monotonic_ns, test.boot_id);
+        if (auto inserted =
+                database.run("INSERT INTO tests (id, name, machine, config_toml, version, "
+                             "period_s, keep_measuring, state, "
+                             "started_wall_ns, started_monotonic_ns, boot_id, "
+                             "model_toml, model_file) VALUES (?, ?, ?, "
+                             "?, ?, ?, ?, 'running', ?, ?, ?, ?, ?)",
+                             wanted_id, test.name, test.machine, test.config_toml, test.version,
+                             test.period_s, test.keep_measuring, test.started.wall_ns,
+                             test.started.monotonic_ns, test.boot_id, test.model_toml, test.model_file);
             !inserted)
             return inserted;
         id = database.last_insert_id();

@@ -16,21 +16,31 @@ namespace thermbal {
 //   module -> scan -> store -> window -> (filter -> SVR sweep -> criterion, shared time constants ->
 //   interval: core's LiveFlow, on the identifier's thread) -> declaration -> stop rule -> stop
 
+namespace {
+
+/// The column of that name, made where there is none yet.
+Column& column_of(std::vector<Column>& columns, const std::string& name) {
+    const auto found = std::ranges::find(columns, name, &Column::name);
+    return found != columns.end() ? *found : columns.emplace_back(Column{name, {}});
+}
+
+}  // namespace
+
 void Daemon::take_scan(Scan& scan) {
     watch_modules(scan);
     watch_time(scan);
     latest_ = scan;
-    bool identifying = false;
     if (is_measuring(test_.state)) {
         store_scan(scan);
         grow_window(scan);
         raise_alarm(scan);
         if (is_measuring(test_.state) && identification_is_due(scan.scan)) {
-            identifying = true;
+            test_.identifying = true;
             test_.submitted_scan = scan.scan;
             identifier_->submit(
                 {generation_, scan.scan, test_.window, test_.declarations.declared_channels(), test_.flow});
         }
+        if (is_measuring(test_.state)) compare_with_model(scan.scan);
         if (is_measuring(test_.state) && over_time(scan)) {
             end_test(TestEvent::abort, fmt::format("longer than test.max_duration_min = {}",
                                                    *options_.config.test.max_duration_min));
@@ -42,12 +52,13 @@ void Daemon::take_scan(Scan& scan) {
     tell_storage_news();
     log_health_hourly();
     if (server_.counters().subscribers > 0) server_.publish("scan", channels_json().value_or(nullptr));
-    if (!is_measuring(test_.state) || !identifying) settle(scan.scan);
+    settle(scan.scan);
 }
 
 void Daemon::take_identification(IdentificationResult result) {
     if (result.generation != generation_ || !is_measuring(test_.state)) return;
-    if (result.window_end_scan <= test_.revised_until_scan) return settle(result.window_end_scan);
+    test_.identifying = false;
+    if (result.window_end_scan <= test_.revised_until_scan) return settle(test_.last_scan);
     identification_s_.add(result.seconds);
     test_.identification_s = result.seconds;
     if (!result.verdict) {
@@ -67,7 +78,7 @@ void Daemon::take_identification(IdentificationResult result) {
         server_.publish("predictions", predictions_json().value_or(nullptr));
         decide();
     }
-    settle(result.window_end_scan);
+    settle(test_.last_scan);
 }
 
 void Daemon::decide() {
@@ -104,6 +115,8 @@ void Daemon::end_test(TestEvent how, const std::string& reason) {
     const auto state = next_state(test_.state, how);
     if (!state) return;
     identifier_->cancel();
+    comparer_->cancel();
+    test_.identifying = test_.comparing = false;
     test_.state = *state;
     test_.end_reason = reason;
     write([id = test_.id, ended = *state, at = now(), reason](Store& store) {
@@ -126,18 +139,24 @@ void Daemon::grow_window(const Scan& scan) {
         window.channels[channel].values.back() = sample.value_C;
         newest_good_C_[channel] = sample.value_C;
     }
+    for (const KnownInput& input : test_.inputs) {
+        std::vector<double>& values = column_of(window.inputs, input.name).values;
+        const double held = values.empty() ? no_value : values.back();
+        values.resize(rows, held);
+        values.back() = input.value;
+    }
     window.scans = rows;
     test_.last_scan = scan.scan;
 }
 
 /// On multiples of every_s of the test's time, as replay does it, so that both see the same windows; while
-/// the identifier is busy, the first scan after it.
+/// the identifier is at work, the first scan after it.
 bool Daemon::identification_is_due(std::int64_t scan) const {
     const double scans_between = options_.config.identification.every_s / options_.config.test.period_s;
     const auto turn = [&](std::int64_t at) {
         return std::floor(static_cast<double>(at) / scans_between + 1e-9);
     };
-    return turn(scan) > turn(test_.submitted_scan) && !identifier_->busy();
+    return turn(scan) > turn(test_.submitted_scan) && !test_.identifying;
 }
 
 void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::int64_t window_end_scan) {

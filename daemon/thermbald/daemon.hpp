@@ -15,11 +15,13 @@
 #include "acquisition/mailbox.hpp"
 #include "acquisition/scan.hpp"
 #include "acquisition/time_watch.hpp"
+#include "compute/comparison.hpp"
 #include "compute/identifier.hpp"
 #include "config/config.hpp"
 #include "declaration/declarations.hpp"
 #include "declaration/stop_rule.hpp"
 #include "modbus_line.hpp"
+#include "model_watch.hpp"
 #include "progress.hpp"
 #include "series/test_state.hpp"
 #include "service/hooks.hpp"
@@ -78,6 +80,10 @@ class Daemon {
             archive_dropped;  ///< why the archive does not speak for this test, once it was contradicted
         std::optional<ArchivedSpectrum> spectrum;
         double spectrum_window_min = 0.0;
+        std::vector<KnownInput> inputs;   ///< as they are now
+        std::optional<ModelWatch> model;  ///< empty: the test is compared with nothing
+        bool identifying = false;         ///< a window is with the identifier
+        bool comparing = false;           ///< a window is with the comparer
     };
 
     Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer server, HookRunner hooks);
@@ -100,13 +106,26 @@ class Daemon {
     void take_back(const WatchedModule& module, std::int64_t first_scan, std::int64_t last_scan);
 
     // Starting and resuming (tests.cpp).
-    Result<TestId> start_test(const std::string& name, const std::string& machine);
-    TestRecord test_record(const std::string& name, const std::string& machine) const;
+    /// What a test is begun with; the configuration's [test] has the defaults.
+    struct TestPlan {
+        std::string name, machine;
+        std::vector<KnownInput> inputs;
+        std::optional<TestModel> model;
+    };
+    Result<TestPlan> plan_of(const nlohmann::json& params) const;
+    Result<TestId> start_test(TestPlan plan);
+    TestRecord test_record(const std::string& name, const std::string& machine, const TestModel* model) const;
     void resume(ResumedTest resumed);
+    void resume_model(const TestRecord& record);
+    void set_input(const KnownInput& input);
     void follow_grid(Grid grid, std::int64_t first_scan);
     void begin_window(double period_s);
     void prepare_flow(const std::string& machine);
     void archive_test();
+
+    // Simulation against measurement (comparison.cpp).
+    void compare_with_model(std::int64_t scan);
+    void take_comparison(const ComparisonResult& result);
 
     // The stop action (stop_action.cpp).
     /// `state` is what the test is when the machine has been stopped.
@@ -140,6 +159,7 @@ class Daemon {
     Result<nlohmann::json> on_start(const nlohmann::json& params);
     Result<nlohmann::json> on_stop(const nlohmann::json& params);
     Result<nlohmann::json> on_annotate(const nlohmann::json& params);
+    Result<nlohmann::json> on_set_inputs(const nlohmann::json& params);
     const ChannelVerdict* verdict_of(const std::string& channel) const;
 
     // The event loop (loop.cpp).
@@ -165,7 +185,7 @@ class Daemon {
     std::optional<AlarmWatch> alarm_watch_;  ///< of the test
     std::uint64_t generation_ = 0;
     std::optional<ScanAssembler> assembler_;
-    RecentFigures lateness_ms_, commit_ms_, identification_s_;
+    RecentFigures lateness_ms_, commit_ms_, identification_s_, comparison_s_;
     std::uint64_t scans_ok_ = 0, scans_late_ = 0, scans_missed_ = 0;
     std::int64_t started_ns_ = 0;
     std::int64_t health_logged_ns_ = 0;
@@ -177,6 +197,7 @@ class Daemon {
 
     Mailbox<LineScan> line_readings_;
     Mailbox<IdentificationResult> identifications_;
+    Mailbox<ComparisonResult> comparisons_;
     Mailbox<Result<void>> stop_outcomes_;
     struct LogLine {
         std::string message;
@@ -188,6 +209,7 @@ class Daemon {
     std::optional<std::int64_t> left_database_ns_;  ///< when a damaged database was set aside, or that failed
     std::vector<std::unique_ptr<ModbusLine>> lines_;
     std::unique_ptr<Identifier> identifier_;            // its thread uses the mailboxes above
+    std::unique_ptr<Comparer> comparer_;                // and so does this one's
     std::vector<std::unique_ptr<LineReader>> readers_;  // last: their threads use lines and mailboxes
 };
 

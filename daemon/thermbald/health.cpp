@@ -78,6 +78,7 @@ Result<json> Daemon::health_json() const {
                 {"lateness_ms", figures_json(lateness_ms_)},
                 {"commit_ms", figures_json(commit_ms_)},
                 {"identification_s", figures_json(identification_s_)},
+                {"comparison_s", figures_json(comparison_s_)},
                 {"unstored_scans", storage_.unstored_scans()},
                 {"unstored_scans_limit", storage_.limits().scans},
                 {"unstored_writes", storage_.unstored_writes()},

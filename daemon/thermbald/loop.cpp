@@ -87,6 +87,9 @@ Daemon::Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer se
             return flow->identify(job.window, job.settled, parallel, cancelled);
         },
         [this](IdentificationResult result) { identifications_.push(std::move(result)); });
+    comparer_ = std::make_unique<Comparer>(
+        [](const ComparisonJob& job, const std::function<bool()>&) { return compare(job); },
+        [this](ComparisonResult result) { comparisons_.push(std::move(result)); });
     for (std::size_t i = 0; i < lines_.size(); ++i) {
         readers_.push_back(std::make_unique<LineReader>(i, *lines_[i], clock_, line_readings_));
     }
@@ -95,6 +98,7 @@ Daemon::Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer se
 Daemon::~Daemon() {
     readers_.clear();
     identifier_.reset();
+    comparer_.reset();
     sd_event_source_unref(close_timer_);
     sd_event_source_unref(watchdog_timer_);
     sd_event_unref(loop_);
@@ -132,6 +136,10 @@ Result<void> Daemon::attach() {
     const std::pair<int, void (*)(Daemon&)> sources[] = {
         {line_readings_.fd(), [](Daemon& self) { self.on_line_readings(); }},
         {identifications_.fd(), [](Daemon& self) { self.on_identifications(); }},
+        {comparisons_.fd(),
+         [](Daemon& self) {
+             for (const ComparisonResult& result : self.comparisons_.take()) self.take_comparison(result);
+         }},
         {stop_outcomes_.fd(),
          [](Daemon& self) {
              for (const auto& outcome : self.stop_outcomes_.take()) self.take_stop_outcome(outcome);
@@ -190,9 +198,9 @@ Result<void> Daemon::run() {
     if (*resumed) {
         resume(std::move(**resumed));
     } else if (options_.config.test.start == TestConfig::Start::automatic) {
-        if (const auto id = start_test(options_.config.test.name, options_.config.test.machine); !id) {
-            return std::unexpected(id.error());
-        }
+        auto plan = plan_of(nlohmann::json::object());
+        if (!plan) return std::unexpected(plan.error());
+        if (const auto id = start_test(std::move(*plan)); !id) return std::unexpected(id.error());
     } else {
         follow_grid({clock_.monotonic_ns(), static_cast<std::int64_t>(options_.config.test.period_s * 1e9)},
                     0);
@@ -285,6 +293,7 @@ void Daemon::feed_watchdog() {
 
 /// Time may go on (for a clock that waits): the scan is stored, and identified where that was due.
 void Daemon::settle(std::int64_t scan) {
+    if (test_.identifying || test_.comparing) return;
     if (assembler_) clock_.settled(assembler_->grid().due_ns(scan));
 }
 

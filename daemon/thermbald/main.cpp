@@ -16,6 +16,7 @@
 #include "config/load.hpp"
 #include "daemon.hpp"
 #include "manual/manual.hpp"
+#include "model_watch.hpp"
 #include "version.hpp"
 
 namespace {
@@ -71,7 +72,7 @@ void leave_signals_to_the_loop() {
 /// that runs for weeks looks as if it leaked. As many heaps as there are threads: two threads on one heap
 /// wait for each other, and a scan would wait for a computation that the host keeps from running.
 void give_memory_back(const Config& config) {
-    const auto threads = static_cast<int>(config.lines.size()) + config.identification.workers + 4;
+    const auto threads = static_cast<int>(config.lines.size()) + config.identification.workers + 5;
     mallopt(M_ARENA_MAX, threads);
     mallopt(M_TRIM_THRESHOLD, 64 * 1024);
 }
@@ -127,6 +128,10 @@ int main(int argc, char** argv) {
         return refused({NextStep::refuse_input,
                         fmt::format("{}: --lockstep needs a configuration with one line, found {}",
                                     flags.config, config->lines.size())});
+    }
+    if (!config->test.model.empty()) {
+        const auto model = read_test_model(config->test.model, *config, config->test.inputs);
+        if (!model) return refused(model.error());
     }
     if (flags.check) {
         fmt::print("{}", explain_config(*config));

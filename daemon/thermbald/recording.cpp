@@ -19,6 +19,7 @@ ScanRecord Daemon::record_of(const Scan& scan) const {
     if (scan.status != ScanStatus::missed) {
         record.started_ns = scan.started_ns;
         record.finished_ns = scan.finished_ns;
+        for (const KnownInput& input : test_.inputs) record.inputs.push_back({input.name, input.value});
     }
     return record;
 }
@@ -43,11 +44,12 @@ void Daemon::leave_damaged_database() {
     left_database_ns_ = real_monotonic_ns();
     KnownTest known;
     if (test_.id > 0) {
-        known = {.id = test_.id,
-                 .record = test_record(test_.name, test_.machine),
-                 .state = test_.state,
-                 .reason = test_.end_reason,
-                 .before_scan = test_.last_scan + 1};
+        known = {
+            .id = test_.id,
+            .record = test_record(test_.name, test_.machine, test_.model ? &test_.model->model() : nullptr),
+            .state = test_.state,
+            .reason = test_.end_reason,
+            .before_scan = test_.last_scan + 1};
         known.record.started = {test_.started_wall_ns, test_.grid.start_ns};
     } else if (const auto open = storage_.store().read().open_test(); open && *open) {
         known = {.id = (*open)->id,

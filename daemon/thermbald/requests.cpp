@@ -31,6 +31,33 @@ Result<std::int64_t> integer_param(const json& params, const char* key, std::int
     return found->get<std::int64_t>();
 }
 
+/// {"spindle_rpm": 5000.0, ...}; empty without the parameter.
+Result<std::vector<KnownInput>> inputs_param(const json& params) {
+    std::vector<KnownInput> inputs;
+    const auto found = params.find("inputs");
+    if (found == params.end() || found->is_null()) return inputs;
+    if (!found->is_object())
+        return fail(NextStep::refuse_input, "inputs: expected an object of numbers by name");
+    for (const auto& [name, value] : found->items()) {
+        if (!is_input_name(name))
+            return fail(
+                NextStep::refuse_input,
+                fmt::format("inputs: found \"{}\"; accepted: a name of letters, digits and _ that is no "
+                            "channel's",
+                            name));
+        if (!value.is_number())
+            return fail(NextStep::refuse_input, fmt::format("inputs.{}: expected a number", name));
+        inputs.push_back({name, value.get<double>()});
+    }
+    return inputs;
+}
+
+json inputs_json(const std::vector<KnownInput>& inputs) {
+    json object = json::object();
+    for (const KnownInput& input : inputs) object[input.name] = input.value;
+    return object;
+}
+
 json sample_json(const Sample& sample) {
     return {{"value_C", sample.good() ? json(sample.value_C) : json(nullptr)},
             {"source_C", number_or_null(sample.source_C)},
@@ -107,6 +134,7 @@ void Daemon::add_methods() {
     changes("start_test", &Daemon::on_start);
     changes("stop_test", &Daemon::on_stop);
     changes("annotate", &Daemon::on_annotate);
+    changes("set_inputs", &Daemon::on_set_inputs);
 }
 
 Result<json> Daemon::status_json() const {
@@ -145,7 +173,9 @@ Result<json> Daemon::status_json() const {
                  ? json(test_.grid.time_s(std::max(test_.last_scan, *test_.identified_scan)) -
                         test_.grid.time_s(*test_.identified_scan))
                  : json(nullptr)},
-            {"identification_s", test_.identification_s}};
+            {"identification_s", test_.identification_s},
+            {"inputs", inputs_json(test_.inputs)},
+            {"model", test_.model ? test_.model->to_json() : json(nullptr)}};
     }
     return status;
 }
@@ -180,6 +210,11 @@ Result<json> Daemon::channels_json() const {
             entry["time_left_min"] = number_or_null(time_left_min(verdict->equilibrium_time_min, time_min));
             entry["reason"] = verdict->reason;
             entry["identification_age_s"] = number_or_null((time_min - verdict->window_end_min) * 60.0);
+        }
+        if (const ChannelComparison* compared = test_.model ? test_.model->channel(channel.name) : nullptr) {
+            entry["simulated_C"] = number_or_null(compared->simulated_C);
+            entry["residual_C"] = number_or_null(compared->residual_C());
+            entry["disagrees"] = test_.model->disagrees(channel.name);
         }
         list.push_back(std::move(entry));
     }
@@ -278,11 +313,37 @@ Result<json> Daemon::on_start(const json& params) {
     const auto name = text_param(params, "name");
     const auto machine = text_param(params, "machine");
     if (!name || !machine) return std::unexpected(!name ? name.error() : machine.error());
-    const TestConfig& defaults = options_.config.test;
-    const auto id =
-        start_test(name->empty() ? defaults.name : *name, machine->empty() ? defaults.machine : *machine);
+    auto plan = plan_of(params);
+    if (!plan) return std::unexpected(plan.error());
+    if (!name->empty()) plan->name = *name;
+    if (!machine->empty()) plan->machine = *machine;
+    const auto id = start_test(std::move(*plan));
     if (!id) return std::unexpected(id.error());
-    return json{{"test", *id}, {"state", to_string(test_.state)}};
+    return json{{"test", *id},
+                {"state", to_string(test_.state)},
+                {"model", test_.model ? json(test_.model->model().model->name) : json(nullptr)}};
+}
+
+/// As configured, with the model and the inputs that a request names instead.
+Result<Daemon::TestPlan> Daemon::plan_of(const json& params) const {
+    const auto toml = text_param(params, "model");
+    const auto file = text_param(params, "model_file");
+    if (!toml || !file) return std::unexpected(!toml ? toml.error() : file.error());
+    const auto inputs = inputs_param(params);
+    if (!inputs) return std::unexpected(inputs.error());
+    const TestConfig& test = options_.config.test;
+    TestPlan plan{test.name, test.machine, *inputs, {}};
+    for (const KnownInput& input : test.inputs) {
+        if (std::ranges::find(plan.inputs, input.name, &KnownInput::name) == plan.inputs.end())
+            plan.inputs.push_back(input);
+    }
+    if (toml->empty() && test.model.empty()) return plan;
+    auto model = toml->empty()
+                     ? read_test_model(test.model, options_.config, plan.inputs)
+                     : parse_test_model(*toml, file->empty() ? "model" : *file, options_.config, plan.inputs);
+    if (!model) return std::unexpected(model.error());
+    plan.model = std::move(*model);
+    return plan;
 }
 
 Result<json> Daemon::on_stop(const json& params) {
@@ -294,6 +355,18 @@ Result<json> Daemon::on_stop(const json& params) {
     const bool aborts = abort != params.end() && abort->get<bool>();
     end_test(aborts ? TestEvent::abort : TestEvent::stop, reason->empty() ? "by hand" : *reason);
     return json{{"test", test_.id}, {"state", to_string(test_.state)}};
+}
+
+Result<json> Daemon::on_set_inputs(const json& params) {
+    if (!is_measuring(test_.state)) return bad_param("no test is running");
+    const auto inputs = inputs_param(params);
+    if (!inputs) return std::unexpected(inputs.error());
+    if (inputs->empty()) return bad_param("inputs: expected at least one, {\"spindle_rpm\": 3000}");
+    for (const KnownInput& input : *inputs) {
+        set_input(input);
+        event("input", fmt::format("{} is {:g} from now on", input.name, input.value));
+    }
+    return json{{"test", test_.id}, {"inputs", inputs_json(test_.inputs)}};
 }
 
 Result<json> Daemon::on_annotate(const json& params) {

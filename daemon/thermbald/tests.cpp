@@ -7,6 +7,7 @@
 
 #include "compute/earlier_tests.hpp"
 #include "config/load.hpp"
+#include "config/model_file.hpp"
 #include "daemon.hpp"
 #include "flow_options.hpp"
 #include "report/spectrum_json.hpp"
@@ -28,7 +29,8 @@ std::string describe_source(const Config& config, const ChannelConfig& channel) 
 
 }  // namespace
 
-TestRecord Daemon::test_record(const std::string& name, const std::string& machine) const {
+TestRecord Daemon::test_record(const std::string& name, const std::string& machine,
+                               const TestModel* model) const {
     const Config& config = options_.config;
     TestRecord record{.name = name,
                       .machine = machine,
@@ -45,11 +47,16 @@ TestRecord Daemon::test_record(const std::string& name, const std::string& machi
                                    channel.place, channel.required, describe_source(config, channel),
                                    describe(channel.calibration)});
     }
+    if (model != nullptr) {
+        record.model_toml = model->toml;
+        record.model_file = model->file;
+    }
     return record;
 }
 
-Result<TestId> Daemon::start_test(const std::string& name, const std::string& machine) {
-    const TestRecord record = test_record(name, machine);
+Result<TestId> Daemon::start_test(TestPlan plan) {
+    const auto& [name, machine, inputs, model] = plan;
+    const TestRecord record = test_record(name, machine, model ? &*model : nullptr);
     storage_.flush();
     if (!storage_.problem().empty()) {
         return fail(NextStep::retry,
@@ -64,11 +71,14 @@ Result<TestId> Daemon::start_test(const std::string& name, const std::string& ma
     test_.name = name;
     test_.started_wall_ns = record.started.wall_ns;
     test_.grid = {record.started.monotonic_ns, period_ns_of(record.period_s)};
+    test_.inputs = inputs;
+    if (model) test_.model.emplace(*model);
     begin_window(record.period_s);
     follow_grid(test_.grid, 0);
     prepare_flow(machine);
-    event("started", fmt::format("test {} \"{}\" of {}", *id, name,
-                                 machine.empty() ? "a machine without name" : machine));
+    event("started", fmt::format("test {} \"{}\" of {}{}", *id, name,
+                                 machine.empty() ? "a machine without name" : machine,
+                                 model ? ", compared with model " + model->file : ""));
     return id;
 }
 
@@ -136,6 +146,7 @@ void Daemon::resume(ResumedTest resumed) {
 
     begin_window(record.period_s);
     prepare_flow(record.machine);
+    resume_model(record);
     const auto position = [&](const std::string& name) {
         const auto& channels = options_.config.channels;
         return static_cast<std::size_t>(std::ranges::find(channels, name, &ChannelConfig::name) -
@@ -147,6 +158,7 @@ void Daemon::resume(ResumedTest resumed) {
             const std::size_t channel = position(record.channels[i].name);
             if (channel < again.samples.size()) again.samples[channel] = scan.samples[i];
         }
+        for (const InputValue& input : scan.inputs) set_input({input.name, input.value});
         grow_window(again);
         // Only so that a limit goes on where it was: what was an alarm has ended the test then.
         alarm_watch_->take(test_.grid.time_s(again.scan), again.samples);
@@ -165,6 +177,27 @@ void Daemon::resume(ResumedTest resumed) {
     event("resumed", fmt::format("test {} \"{}\" goes on: {} scans are stored, about {} were missed",
                                  test_.id, test_.name, last_scan + 1, std::max<std::int64_t>(missed, 0)));
     if (test_.state == TestState::declared) act_on_declaration();
+}
+
+/// From the next scan on.
+void Daemon::set_input(const KnownInput& input) {
+    const auto known = std::ranges::find(test_.inputs, input.name, &KnownInput::name);
+    if (known == test_.inputs.end())
+        test_.inputs.push_back(input);
+    else
+        known->value = input.value;
+}
+
+/// With the model that the test was begun with, whatever its file says by now.
+void Daemon::resume_model(const TestRecord& record) {
+    if (record.model_toml.empty()) return;
+    auto model = load_model(record.model_toml, record.model_file);
+    if (!model)
+        return event("model_failed", "the stored model is not read any more: " + model.error().message);
+    test_.model.emplace(
+        TestModel{record.model_file, record.model_toml, std::make_shared<const Model>(std::move(*model))});
+    const auto events = storage_.store().read().events(test_.id, 0, INT64_MAX);
+    if (events) test_.model->restore(*events);
 }
 
 void Daemon::follow_grid(Grid grid, std::int64_t first_scan) {

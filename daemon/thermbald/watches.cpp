@@ -68,6 +68,7 @@ void Daemon::take_back(const WatchedModule& module, std::int64_t first_scan, std
     test_.revised_until_scan = last_scan;
     test_.submitted_scan = test_.identified_scan.value_or(0);
     identifier_->cancel();
+    test_.identifying = false;
     write([id = test_.id, channels = module.channels, first_scan, last_scan](Store& store) -> Result<void> {
         const auto marked = store.mark_stuck(id, channels, first_scan, last_scan);
         return marked ? Result<void>() : std::unexpected(marked.error());

@@ -74,6 +74,28 @@ TEST_F(Frame, AllChannelsAndEventsAreOnTheSmallestUsualScreen) {
     EXPECT_THAT(lines[23], HasSubstr("q quit"));
 }
 
+TEST_F(Frame, ATestWithAModelShowsEachResidualAndWhichCannotBeChance) {
+    EXPECT_THAT(render_frame(scene, {24, 80}, {false, true}), Not(HasSubstr("resid")));
+    for (auto& channel : scene.channels["channels"]) {
+        if (channel["channel"] == "T1") continue;
+        channel["simulated_C"] = 24.2;
+        channel["residual_C"] = channel["channel"] == "T5" ? 0.84 : -0.03;
+        channel["disagrees"] = channel["channel"] == "T5";
+    }
+    const auto lines = lines_of(render_frame(scene, {24, 80}, {false, true}));
+    EXPECT_THAT(lines[2], HasSubstr("resid C"));
+    EXPECT_THAT(lines[2 + 5], HasSubstr("+0.84"));
+    EXPECT_THAT(lines[2 + 5], HasSubstr("declared"));
+    EXPECT_THAT(lines[2 + 6], HasSubstr("-0.03"));
+    for (const std::string& line : lines) EXPECT_LE(display_width(line), 80U);
+    const auto coloured = lines_of(render_frame(scene, {24, 80}, {true, true}));
+    EXPECT_THAT(coloured[2 + 5], HasSubstr("\x1b[1;31m  +0.84"));
+    scene.page = Page::channel;
+    scene.chosen = 4;
+    EXPECT_THAT(render_frame(scene, {24, 80}, {false, true}),
+                HasSubstr("24.20 C   measured is +0.84 C off: more than noise and model allow"));
+}
+
 TEST_F(Frame, AReadingThatIsNotGoodShowsItsQualityAndNoNumber) {
     const auto lines = lines_of(render_frame(scene, {24, 80}, {false, true}));
     EXPECT_EQ(lines[2 + 9].substr(0, 11), "T9     open");

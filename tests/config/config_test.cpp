@@ -89,6 +89,8 @@ TEST(DefaultConfiguration, WhatIsCommentedOutIsAcceptedToo) {
         text.replace(at, 2 + key.size(), with);
     };
     uncomment("max_duration_min", "max_duration_min");
+    uncomment("model", "model");
+    uncomment("inputs", "inputs");
     uncomment("operators_group", "operators_group");
     uncomment("response_timeout_ms", "response_timeout_ms");
     uncomment("connect_timeout_ms", "connect_timeout_ms");
@@ -162,7 +164,8 @@ TEST(Configuration, ExplainedOneMeansTheSame) {
           std::string(
               "[stop]\naction = \"write_register\"\naddress = 4\nvalue = 65535\ntimeout_s = 2.5\n")}) {
         const Config config = load(
-            "[test]\nname = \"idle \\\"5000\\\"\"\nperiod_s = 7.5\nmax_duration_min = 90\nstart = \"auto\"\n",
+            "[test]\nname = \"idle \\\"5000\\\"\"\nperiod_s = 7.5\nmax_duration_min = 90\nstart = \"auto\"\n"
+            "model = \"/models/a b.toml\"\ninputs = { spindle_rpm = 5000, spindle_load_pct = 12.5 }\n",
             "", stop);
         const std::string explained = explain_config(config);
         const auto again = load_config(explained, "explained", shipped_profiles());
@@ -170,6 +173,10 @@ TEST(Configuration, ExplainedOneMeansTheSame) {
         EXPECT_EQ(explain_config(*again), explained);
         EXPECT_EQ(again->test.name, config.test.name);
         EXPECT_EQ(again->test.max_duration_min, 90.0);
+        EXPECT_EQ(again->test.model, "/models/a b.toml");
+        ASSERT_EQ(again->test.inputs.size(), 2U);
+        EXPECT_EQ(again->test.inputs[0].name, "spindle_load_pct");
+        EXPECT_EQ(again->test.inputs[0].value, 12.5);
         EXPECT_EQ(again->stop.command, config.stop.command);
         EXPECT_EQ(again->stop.value, config.stop.value);
     }

@@ -31,6 +31,8 @@ def wait_until(condition, what, seconds=60):
 
 
 def toml(value):
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {toml(of_key)}" for key, of_key in value.items()) + " }"
     return json.dumps(value)  # strings, numbers, booleans and lists read the same in TOML
 
 

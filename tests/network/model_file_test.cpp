@@ -56,6 +56,21 @@ std::string refusal(const std::string& text) {
     return model.error().message;
 }
 
+TEST(ModelOfATest, AsksForColumnsThatTheTestHas) {
+    const TestColumns columns{{"T1", "T3"}, {"spindle_rpm"}};
+    EXPECT_TRUE(load_model(good, "m.toml", columns));
+    EXPECT_TRUE(load_model(with("18.0", "\"T1\""), "m.toml", columns));
+    const auto message = [&](std::string_view from, std::string_view to) {
+        const auto refused = load_model(with(from, to), "m.toml", columns);
+        return refused ? std::string() : refused.error().message;
+    };
+    EXPECT_THAT(message("18.0", "\"T2\""), StartsWith("m.toml:3:13: model.ambient_C: found \"T2\""));
+    EXPECT_THAT(
+        message("\"spindle_rpm\"", "\"rpm\""),
+        StartsWith("m.toml:17:19: source.proportional_to: found \"rpm\"; the test has no such input"));
+    EXPECT_THAT(message("\"T3\"", "\"T4\""), HasSubstr("no [[sensor]] is a channel of the test"));
+}
+
 TEST(ModelFile, GivesTheModelThatIsWritten) {
     const auto model = load_model(good, "m.toml");
     ASSERT_TRUE(model) << model.error().message;

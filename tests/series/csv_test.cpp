@@ -36,6 +36,14 @@ TEST(Csv, WhatIsWrittenReadsBackToTheSameDoubles) {
     EXPECT_EQ(again->inputs[0].values, test.inputs[0].values);
 }
 
+TEST(Csv, ANameOfAnInputIsNoChannelsAndFitsAnyProgram) {
+    for (const char* name : {"spindle_rpm", "x", "_load", "T", "Tool", "T1x"})
+        EXPECT_TRUE(is_input_name(name)) << name;
+    for (const char* name : {"", "T1", "T16", "time_s", "2nd", "spindle rpm", "a=b", "\u00e4"})
+        EXPECT_FALSE(is_input_name(name)) << name;
+    EXPECT_FALSE(is_input_name(std::string(65, 'x')));
+}
+
 TEST(Csv, AnInputMayHaveAnyName) {
     const RecordedTest test{{0.0}, {{"T1", {1.0}}}, {{"load, \"of\"\r\nthe spindle", {2.0}}}};
     const auto again = parse_recorded_test(format_recorded_test(test), "again");

@@ -21,6 +21,10 @@ TEST(Window, RowsGoToTheirScanAndWhatIsNotThereStaysMissing) {
     EXPECT_THAT(window.channels[0].values,
                 ElementsAre(DoubleEq(1.0), DoubleEq(2.0), NanSensitiveDoubleEq(no_value), DoubleEq(5.0)));
     EXPECT_THAT(window.inputs[0].values, ElementsAre(0.0, 5000.0, 5000.0, 0.0));
+    const RecordedTest again = recording_of(window);
+    EXPECT_THAT(again.time_s, ElementsAre(0.0, 15.0, 30.0, 45.0));
+    EXPECT_EQ(again.channels[0].name, "T1");
+    EXPECT_EQ(again.inputs[0].values, window.inputs[0].values);
 }
 
 TEST(Window, UntilAndFromKeepTheScanAtTheLimit) {

@@ -55,7 +55,7 @@ TEST_F(OpeningTest, TheDatabaseIsDurableStrictAndNotForEveryone) {
     const auto store = open_store(path);
     Direct direct(path);
     EXPECT_EQ(direct.integer("SELECT journal_mode = 'wal' FROM pragma_journal_mode"), 1);
-    EXPECT_EQ(direct.integer("PRAGMA user_version"), 5);
+    EXPECT_EQ(direct.integer("PRAGMA user_version"), 6);
     EXPECT_EQ(
         direct.integer("SELECT count(*) FROM pragma_table_list WHERE schema = 'main' AND type = 'table' AND "
                        "name NOT LIKE 'sqlite_%' AND NOT strict"),
@@ -144,12 +144,12 @@ TEST_F(OpeningTest, ANewerDatabaseIsRefusedAndLeftAlone) {
         const auto store = open_store(path);
     }
     {
-        Direct(path).run("PRAGMA user_version = 6");
+        Direct(path).run("PRAGMA user_version = 7");
     }
     const auto before = contents(path);
     for (const auto& message :
          {Store::open(path, start).error().message, Reader::open(path).error().message}) {
-        EXPECT_THAT(message, HasSubstr("schema version 6"));
+        EXPECT_THAT(message, HasSubstr("schema version 7"));
         EXPECT_THAT(message, HasSubstr("newer thermbald"));
     }
     EXPECT_EQ(contents(path), before);

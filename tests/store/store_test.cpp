@@ -117,10 +117,12 @@ TEST_F(StoreTest, CsvIsTheRecordedTest) {
     EXPECT_EQ(recorded->inputs[0].name, "spindle_rpm");
 }
 
-TEST_F(StoreTest, WhatTheModuleSaidStandsBesideWhatTheCalibrationMadeOfIt) {
+TEST_F(StoreTest, WhatATestWasBegunWithAndWhatTheModuleSaidStandBesideItsValues) {
     auto store = open_store(path);
     TestRecord record = test_record(2);
     record.channels[1].calibration = "certificate K-2231: R0 100.012 ohm";
+    record.model_toml = "[model]\nname = \"head\"\n";
+    record.model_file = "/home/eng/head.toml";
     const auto id = store.begin_test(record);
     ScanRecord scan = scan_record(0, 2);
     scan.samples[1].source_C = 18.25;
@@ -132,6 +134,8 @@ TEST_F(StoreTest, WhatTheModuleSaidStandsBesideWhatTheCalibrationMadeOfIt) {
     EXPECT_EQ(scans->front().samples[1].value_C, value_C(0, 1));
     EXPECT_EQ(store.read().test(*id)->record.channels[1].calibration, record.channels[1].calibration);
     EXPECT_EQ(Direct(path).integer("SELECT count(*) FROM readings WHERE source_C = 18.25"), 1);
+    EXPECT_EQ(store.read().test(*id)->record.model_toml, record.model_toml);
+    EXPECT_EQ(store.read().test(*id)->record.model_file, record.model_file);
 }
 
 TEST_F(StoreTest, FrozenSamplesLoseTheirValueAndKeepTheirRegister) {

@@ -12,6 +12,12 @@
 
 namespace thermbal {
 
+/// A known input of a test, constant until somebody says another value: a column of the recorded test.
+struct KnownInput {
+    std::string name;
+    double value = 0.0;
+};
+
 /// The configuration of the daemon: plain data with the defaults of config/README.md. Every reference between
 /// tables (line of a unit, unit of a channel) is resolved to an index, every profile is loaded.
 struct TestConfig {
@@ -22,6 +28,8 @@ struct TestConfig {
     std::optional<double> max_duration_min;  ///< abort a test that runs longer
     bool keep_measuring = false;
     Start start = Start::manual;
+    std::string model;               ///< file of the simulation that a test is compared with; empty: none
+    std::vector<KnownInput> inputs;  ///< as a test begins: spindle_rpm, ...
 };
 
 struct StoreConfig {

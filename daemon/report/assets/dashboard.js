@@ -5,7 +5,7 @@
   const at = id => document.getElementById(id);
   const finite = value => typeof value === 'number' && isFinite(value);
   const fixed = (value, digits = 2) => finite(value) ? value.toFixed(digits) : '-';
-  const signed = value => finite(value) ? (value > 0 ? '+' : '') + value.toFixed(1) : '-';
+  const signed = (value, digits = 1) => finite(value) ? (value > 0 ? '+' : '') + value.toFixed(digits) : '-';
   const duration = minutes => !finite(minutes) ? '-' : Math.abs(minutes) < 600 ? minutes.toFixed(0) + '\u00a0min' : (minutes / 60).toFixed(1) + '\u00a0h';
   const words = name => (name || '').replaceAll('_', ' ');
 
@@ -53,11 +53,14 @@
     at('facts').replaceChildren(...(!test ? [] : [
       fact(duration(test.time_min), `measured, ${test.scans} scans`),
       fact(finite(slowest) ? duration(slowest) : '-', 'thermal balance of the channels known so far'),
+      ...(test.model ? [fact(words(test.model.state), `simulation and measurement, model ${test.model.name}`)] : []),
       fact(`${status.good_channels ?? '-'} / ${scene.channels.length}`, 'channels with a good reading'),
     ]));
   }
 
   function showChannels() {
+    const compared = scene.channels.some(channel => finite(channel.residual_C));
+    at('residual').hidden = !compared;
     at('channels').replaceChildren(...scene.channels.map(channel => {
       const tr = document.createElement('tr');
       const good = channel.quality === 'good', known = channel.state === 'declared';
@@ -65,6 +68,7 @@
         named(channel), cell(channel.place || '', 'place wide'),
         cell(good ? fixed(channel.value_C) : words(channel.quality), good ? 'number' : 'number bad'),
         cell(good ? signed(channel.rate_C_per_h) : '-', 'number wide'),
+        ...(compared ? [cell(signed(channel.residual_C, 2), channel.disagrees ? 'number bad' : 'number')] : []),
         cell(fixed(channel.steady_state_C), known ? 'number good' : 'number quiet'),
         cell(finite(channel.steady_state_low_C) ? `${fixed(channel.steady_state_low_C)} – ${fixed(channel.steady_state_high_C)}` : '-', 'number wide'),
         cell(duration(channel.time_left_min), 'number wide'),

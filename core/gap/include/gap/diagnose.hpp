@@ -52,12 +52,19 @@ struct Suspect {
 
 /// An experiment that would tell an effect from a suspect: both are simulated.
 struct SeparatingExperiment {
-    std::string against;     ///< kind
-    std::string experiment;  ///< what to do, in plain words
-    std::string channel;     ///< where the two would differ most
-    double difference_C = 0.0;
-    double sigmas = 0.0;  ///< of the difference over the whole experiment
+    /// From half way through a run of the same length at constant speed in a constant room on.
+    enum class Kind { cool_down, second_speed, room_step };
+    std::string against;     ///< kind of effect
+    std::string against_at;  ///< its place
+    Kind kind = Kind::cool_down;
+    std::string channel;        ///< where the two would differ most
+    double difference_C = 0.0;  ///< there, beyond what going on unchanged would show
+    double sigmas = 0.0;        ///< of the difference over the whole experiment
+    bool separates = false;     ///< whether that is enough to tell them apart
 };
+/// "cool_down"; and what to do, in plain words.
+std::string_view to_string(SeparatingExperiment::Kind kind);
+std::string_view in_words(SeparatingExperiment::Kind kind);
 
 struct FoundEffect {
     Effect effect;
@@ -68,7 +75,7 @@ struct FoundEffect {
     double probability = 0.0;
     std::vector<CalibratedParameter> parameters;
     std::vector<Suspect> alternatives;
-    std::vector<SeparatingExperiment> experiments;
+    std::vector<SeparatingExperiment> experiments;  ///< alternatives in their order, clearest first
     double rmse_before_C = 0.0;
     double rmse_after_C = 0.0;
 };

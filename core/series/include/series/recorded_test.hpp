@@ -28,6 +28,9 @@ struct RecordedTest {
 /// missing sample. `name` stands in the messages (file name). Errors (refuse_input) carry line and column.
 Result<RecordedTest> parse_recorded_test(std::string_view csv_text, std::string_view name);
 
+/// Whether a known input may be called so: letters, digits and '_', no channel's name, not "time_s".
+bool is_input_name(std::string_view name);
+
 /// The inverse of parse_recorded_test: shortest digits that read back to the same double, NaN as an empty
 /// cell.
 std::string format_recorded_test(const RecordedTest& test);
@@ -53,6 +56,9 @@ double median_step_s(const RecordedTest& test);
 /// Puts a recording on the grid of `period_s`, from its first row on: every row goes to the nearest scan,
 /// rows that share a scan are averaged, a scan without a row is NaN, an input holds its last value.
 TestWindow to_window(const RecordedTest& test, double period_s);
+
+/// The inverse of to_window: a row for each scan.
+RecordedTest recording_of(const TestWindow& window);
 
 /// The first scans of a window: those at times <= until_s.
 TestWindow window_until(const TestWindow& window, double until_s);

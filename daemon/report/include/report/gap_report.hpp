@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "gap/diagnose.hpp"
 
@@ -9,6 +10,9 @@ namespace thermbal {
 /// One sentence that needs no knowledge of the catalogue: what was missing, where, since when, how large,
 /// with the 90 % interval of its size.
 std::string effect_in_words(const FoundEffect& found);
+
+/// Of each alternative the experiment that parts it best from the effect, whether that is enough or not.
+std::vector<const SeparatingExperiment*> clearest_experiments(const FoundEffect& found);
 
 /// A diagnosis as one HTML file that needs nothing else: verdict in plain words, gap before and after for
 /// every run, the effects, the evidence of what else it might be, and per channel measured, before, after and

@@ -40,6 +40,8 @@ struct TestRecord {
     Moment started;
     std::string boot_id;
     std::vector<ChannelRecord> channels;
+    std::string model_toml = {};  ///< the simulation model that the test is compared with; empty: none
+    std::string model_file = {};  ///< where it came from, for a person
 };
 
 struct StoredTest {
