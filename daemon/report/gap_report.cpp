@@ -117,8 +117,8 @@ std::string experiments_list(const FoundEffect& found) {
 
 std::string effect_section(const FoundEffect& found) {
     std::string html = fmt::format(
-        "<div class=\"card\"><h3>{}</h3><p>With it the gap of the fitted run falls from {:.3f} to {:.3f} "
-        "&deg;C. "
+        "<div class=\"card\"><h3>{}</h3><p>The gap of the fitted run is {:.3f} &deg;C without it, "
+        "{:.3f} &deg;C with it. "
         "Its numbers, with their 90 % intervals:</p><ul>",
         escaped(as_a_sentence(effect_in_words(found))), found.rmse_before_C, found.rmse_after_C);
     for (const CalibratedParameter& number : found.parameters)

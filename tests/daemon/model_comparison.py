@@ -9,7 +9,7 @@ import subprocess
 
 from daemon_support import CTL, Daemon, Simulator, configuration, control, database, run, scratch
 
-END_MIN = 150
+END_MIN = 120
 MODEL = """[model]
 name = "three parts"
 ambient_C = "T1"
@@ -129,20 +129,17 @@ def residual_is_measured_less_simulated(folder, status):
 
 def a_hidden_heat_is_told_once_and_survives_a_kill():
     with scratch() as folder, Simulator("--lockstep", "15", "--replay", machine_csv(folder, 60.0)) as sim:
-        config = configured(folder, sim, start="manual")
         model = model_file(folder)
+        config = configured(folder, sim, model=model)
         with Daemon(folder, config, "--lockstep") as daemon:
-            daemon.wait_for("status", lambda status: True, "an answer")
-            said = control("start", "--model", model, "--socket", f"{folder}/daemon.sock")
-            assert "three parts" in said, said
-            daemon.wait_for("status", lambda status: status["test"]["model"]["state"] == "disagrees", "the event", 120)
+            daemon.wait_for("status", lambda s: s["test"] and s["test"]["model"]["state"] == "disagrees", "the event", 120)
             daemon.process.send_signal(signal.SIGKILL)
             daemon.process.wait()
         told = events_of(folder, "model_disagrees")
         assert told and told[0]["time_s"] > 60.0 * 60.0, told
         assert told[0]["channel"] in told[0]["message"] and "three parts" in told[0]["message"], told
-        pathlib.Path(model).write_text("gone = true\n", encoding="utf-8")  # the test keeps its own
-        with Daemon(folder, config, "--lockstep", "--exit-when-ended") as daemon:
+        pathlib.Path(model).unlink()  # the test keeps its own
+        with Daemon(folder, configured(folder, sim), "--lockstep", "--exit-when-ended") as daemon:
             assert daemon.wait_ended(200) == 0, daemon.log_text()
         changes = {}
         with database(folder) as stored:
@@ -174,7 +171,8 @@ def another_machine_disagrees():
 
 
 def a_bad_model_is_refused_with_its_place():
-    with scratch() as folder, Simulator("--lockstep", "15", "--replay", machine_csv(folder, 0.0)) as sim:
+    faster = ["--time-scale", "300"]  # nobody's lockstep waits for the person who starts a test
+    with scratch() as folder, Simulator(*faster, "--replay", machine_csv(folder, 0.0)) as sim:
         config = configured(folder, sim, start="manual")
         cases = [(MODEL.replace("heat_capacity_J_per_K = 3000.0", "heat_capacity_J_per_K = -1"), "model.toml:8:"),
                  (MODEL.replace('channel = "T2"', 'chanel = "T2"'), "did you mean"),
@@ -182,7 +180,7 @@ def a_bad_model_is_refused_with_its_place():
                  (MODEL.replace('ambient_C = "T1"', 'ambient_C = "T9"'), "model.toml:3:"),
                  (MODEL.replace('channel = "T', 'channel = "T2'), "no [[sensor]] is a channel of the test"),
                  ("[model\n", "model.toml:1:")]
-        with Daemon(folder, config, "--lockstep") as daemon:
+        with Daemon(folder, config, *faster) as daemon:
             daemon.wait_for("status", lambda status: True, "an answer")
             for text, expected in cases:
                 model = model_file(folder, text=text)
@@ -197,14 +195,19 @@ def a_bad_model_is_refused_with_its_place():
                     assert "inputs" in str(refused), refused
                 else:
                     raise AssertionError(f"taken: {wrong}")
-        with Daemon(folder, configured(folder, sim, model=model_file(folder, text="[model\n")), "--lockstep") as daemon:
+            said = control("start", "--model", model_file(folder), "--input", "spindle_rpm=4000", "--socket",
+                           f"{folder}/daemon.sock")
+            assert said == 'test 1 is running, compared with model "three parts"\n', said
+            status = daemon.wait_for("status", lambda s: s["test"]["model"]["compared_at_min"], "a comparison")
+            assert status["test"]["inputs"] == {"spindle_rpm": 4000.0}, status["test"]["inputs"]
+        with Daemon(folder, configured(folder, sim, model=model_file(folder, text="[model\n")), *faster) as daemon:
             assert daemon.wait_ended(20) == 2 and "model.toml:1:" in daemon.log_text(), daemon.log_text()
 
 
 def an_input_changes_while_the_test_runs():
     with scratch() as folder, Simulator("--lockstep", "15", "--replay", machine_csv(folder, 0.0)) as sim:
         with Daemon(folder, configured(folder, sim, model=model_file(folder)), "--lockstep") as daemon:
-            daemon.wait_for("status", lambda s: s["test"] and s["test"]["scans"] > 3, "scans")
+            daemon.wait_for("status", lambda s: s["test"] and s["test"]["scans"] > 120, "scans")
             assert control("inputs", "spindle_rpm=3000", "--socket", f"{folder}/daemon.sock") == "noted\n"
             daemon.wait_for("status", lambda s: s["state"] == "aborted", "the end", 120)
         with database(folder) as stored:

@@ -35,7 +35,7 @@ Diagnosis some_diagnosis() {
                                  .difference_C = 0.75,
                                  .sigmas = 30.0,
                                  .separates = true});
-    found.experiments.push_back({.against = "sensor_offset", .against_at = "T1", .sigmas = 1.0});
+    found.experiments.push_back({.against = "sensor_offset", .against_at = "T1", .channel = "T1"});
     found.experiments.push_back({.against = "cutting_heat", .against_at = "bed", .channel = "T1"});
     diagnosis.effects.push_back(found);
     return diagnosis;
