@@ -20,7 +20,7 @@ constexpr std::string_view disagrees_kind = "model_disagrees";
 constexpr std::string_view agrees_kind = "model_agrees";
 constexpr std::string_view failed_kind = "model_failed";
 
-double turn(double time_s) {
+double check_turn(double time_s) {
     return std::floor(time_s / check_every_s + 1e-9);
 }
 
@@ -66,7 +66,7 @@ void ModelWatch::restore(std::span<const EventRecord> events) {
 }
 
 bool ModelWatch::check_is_due(double time_s) const {
-    return turn(time_s) > turn(asked_to_check_s_);
+    return check_turn(time_s) > check_turn(asked_to_check_s_);
 }
 
 ComparisonJob ModelWatch::job(std::uint64_t generation, std::int64_t scan, TestWindow window) {
