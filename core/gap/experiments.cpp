@@ -9,6 +9,7 @@
 
 #include "ground.hpp"
 #include "network/simulate.hpp"
+#include "residual_timing.hpp"
 
 namespace thermbal {
 namespace {
@@ -112,10 +113,11 @@ SeparatingExperiment outcome(const Plan& plan, const FitData& run, const Rival& 
 std::optional<Effect> best_start(const Evidence& evidence, const Explanation& others,
                                  const Suspect& suspect) {
     const ScreeningGround ground(evidence, others);
+    const ResidualTiming timing = residual_timing(evidence.run, others.fit.point);
     std::optional<Screened> best;
     for (const Candidate& candidate : all_candidates(others.fit.model, evidence.room_columns)) {
         if (candidate.definition->kind != suspect.kind || candidate.at != suspect.at) continue;
-        Screened one = screen(candidate, ground, {});
+        Screened one = screen(candidate, ground, timing);
         if (!best || one.log_likelihood_gain > best->log_likelihood_gain) best = std::move(one);
     }
     if (!best) return std::nullopt;
