@@ -350,8 +350,7 @@ void put_help_page(Frame& frame) {
     put_rule(frame, "what is shown");
     entry("12.34", "declared: it settles here, proved, in its 90 % interval", Ink::good_bold);
     entry("12.34", "the newest estimate: not proved yet, it may still move", Ink::dim);
-    entry("resid C", "measured less simulated by the test's model; red: more than noise and model allow",
-          Ink::dim);
+    entry("resid C", "measured less simulated; red: more than noise and model allow", Ink::dim);
     entry("open, gap ...", "no reading: never a number that the sensor did not send", Ink::bad);
     entry("left", "time until 95 % of the rise", Ink::dim);
     entry("n, RMSE", "lags of the regression, and its error over the window", Ink::dim);
