@@ -90,6 +90,8 @@ class LinkTest : public ::testing::TestWithParam<Transport> {
         EXPECT_TRUE(read(8)) << message_;
     }
 
+    /// What a script is told while it runs. The peer still runs it when a test's own variables are gone.
+    std::atomic<int> told_ = 0;
     std::unique_ptr<ScriptedPeer> peer_;
     LinkOptions options_;
     std::unique_ptr<Link> link_;
@@ -136,21 +138,20 @@ TEST_P(LinkTest, LateReplyIsNeverTheNextReadingWhenAskedAgainAtOnce) {
 }
 
 TEST_P(LinkTest, PersistentlyLatePeerNeverGivesAReadingAndHealsWhenItGetsFaster) {
-    std::atomic<bool> late = true;
-    start([&](const Heard& heard, const Send& send, const HangUp&) {
-        if (late) wait(140);
+    told_ = 140;  // ms
+    start([this](const Heard& heard, const Send& send, const HangUp&) {
+        wait(told_);
         send(heard.right_reply());
     });
     for (int i = 0; i < 8; ++i) EXPECT_FALSE(read(i));
-    late = false;
+    told_ = 0;
     wait(300);
     EXPECT_TRUE(read()) << message_;
 }
 
 TEST_P(LinkTest, APeerThatIsAlwaysTwoRepliesBehindGivesNoReading) {
     // The reply to an older probe must not pass for that to the newest one.
-    std::deque<Heard> owed;
-    start([&](const Heard& heard, const Send& send, const HangUp&) {
+    start([owed = std::deque<Heard>()](const Heard& heard, const Send& send, const HangUp&) mutable {
         owed.push_back(heard);
         if (owed.size() <= 2) return;
         send(owed.front().right_reply());
@@ -262,16 +263,15 @@ TEST_P(LinkTest, UnsolicitedFrameBetweenScansIsReadAway) {
 }
 
 TEST_P(LinkTest, EveryExceptionIsAnErrorThatKeepsTheLink) {
-    std::atomic<int> code = 0;
-    start([&](const Heard& heard, const Send& send, const HangUp&) {
-        send(code == 0 ? heard.right_reply() : heard.exception(code));
+    start([this](const Heard& heard, const Send& send, const HangUp&) {
+        send(told_ == 0 ? heard.right_reply() : heard.exception(told_));
     });
     for (const int each : {1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 99}) {
-        code = each;
+        told_ = each;
         EXPECT_FALSE(read());
         EXPECT_EQ(next_, NextStep::retry);
         EXPECT_THAT(message_, HasSubstr("exception " + std::to_string(each)));
-        code = 0;
+        told_ = 0;
         EXPECT_TRUE(read()) << message_;
     }
     EXPECT_EQ(link_->counters().connects, 1U);
@@ -279,17 +279,17 @@ TEST_P(LinkTest, EveryExceptionIsAnErrorThatKeepsTheLink) {
 }
 
 TEST_P(LinkTest, WritesAreConfirmedOrAnError) {
-    std::atomic<bool> lie = false;
-    start([&](const Heard& heard, const Send& send, const HangUp&) {
+    start([this](const Heard& heard, const Send& send, const HangUp&) {
         Heard answer = heard;
-        if (lie) answer.frame[heard.transport == Transport::tcp ? 9 : 3] ^= 1;
+        const bool lies = told_ != 0;
+        if (lies) answer.frame[heard.transport == Transport::tcp ? 9 : 3] ^= 1;
         const std::size_t head = heard.transport == Transport::tcp ? 7 : 1;
         send(heard.frame_around(Bytes(answer.frame.begin() + static_cast<long>(head),
                                       answer.frame.begin() + static_cast<long>(head) + 5)));
     });
     EXPECT_TRUE(link_->write_coil(1, 3, true));
     EXPECT_TRUE(link_->write_register(1, 4, 0xBEEF));
-    lie = true;
+    told_ = 1;
     EXPECT_FALSE(link_->write_coil(1, 3, true));
     EXPECT_FALSE(link_->write_register(1, 4, 7));
 }
