@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "carry_over.hpp"
 #include "comparison.hpp"
 #include "describe.hpp"
 #include "disagreement.hpp"
@@ -167,6 +168,7 @@ Result<Diagnosis> diagnose(const Model& model, const RecordedTest& test, std::sp
     }
     if (auto done = compare_runs(*evidence, test, holdouts, options, diagnosis); !done)
         return std::unexpected(done.error());
+    doubt_what_does_not_carry_over(diagnosis);
     return diagnosis;
 }
 

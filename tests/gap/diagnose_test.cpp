@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "carry_over.hpp"
 #include "explanation.hpp"
 #include "network/effect.hpp"
 #include "odds.hpp"
@@ -88,6 +89,27 @@ TEST(Odds, ANameHasToDescribeTheRunAsWellAsNoName) {
 TEST(Odds, AreProbabilities) {
     const Odds odds = odds_of(survey_with(5.0, 1.0, 6.0), small_machine());
     EXPECT_NEAR(odds.nothing + odds.nameless + odds.kinds.front().probability, 1.0, 1e-12);
+}
+
+Diagnosis named_surely(double held_before_C, double held_after_C) {
+    Diagnosis diagnosis;
+    diagnosis.verdict = GapVerdict::explained;
+    diagnosis.effects.emplace_back().probability = 0.96;
+    diagnosis.holdouts.resize(1);
+    diagnosis.holdouts.front().before_rmse_C = held_before_C;
+    diagnosis.holdouts.front().after_rmse_C = held_after_C;
+    doubt_what_does_not_carry_over(diagnosis);
+    return diagnosis;
+}
+
+TEST(Diagnose, ANameThatMakesAHeldOutRunWorseIsDoubtful) {
+    const Diagnosis worse = named_surely(0.05, 0.2);
+    EXPECT_NEAR(worse.effects.front().probability, 0.06, 1e-9);
+    EXPECT_EQ(worse.verdict, GapVerdict::partly_explained);
+    EXPECT_NE(worse.reason.find("from 0.050 to 0.200 C"), std::string::npos) << worse.reason;
+    const Diagnosis better = named_surely(0.2, 0.05);
+    EXPECT_EQ(better.effects.front().probability, 0.96);
+    EXPECT_EQ(better.verdict, GapVerdict::explained);
 }
 
 }  // namespace
