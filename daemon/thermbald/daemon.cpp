@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include "compute/declaration_record.hpp"
 #include "report/verdict_json.hpp"
 #include "service/notify.hpp"
 
@@ -179,20 +180,8 @@ void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::
             continue;
         }
         const ChannelVerdict& verdict = *verdict_of(change.channel);
-        DeclarationRecord record{.channel = verdict.channel,
-                                 .window_end_scan = window_end_scan,
-                                 .declared_at_min = verdict.declared_at_min,
-                                 .n = verdict.n,
-                                 .C = verdict.svr.C,
-                                 .sigma = verdict.svr.sigma,
-                                 .steady_state_C = verdict.steady_state_C,
-                                 .steady_state_low_C = verdict.steady_state_low_C,
-                                 .steady_state_high_C = verdict.steady_state_high_C,
-                                 .equilibrium_time_min = verdict.equilibrium_time_min,
-                                 .rmse_by_n_C = verdict.rmse_by_n_C,
-                                 .basis_json = verdict_to_json(verdict).dump(),
-                                 .version = options_.version,
-                                 .withdrawn = {}};
+        const nlohmann::json json = verdict_to_json(verdict);
+        auto record = declaration_record(verdict, window_end_scan, json.dump(), options_.version);
         write([id = test_.id, record = std::move(record)](Store& store) {
             return store.record_declaration(id, record);
         });
@@ -201,7 +190,7 @@ void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::
                           verdict.channel, verdict.steady_state_C, verdict.steady_state_low_C,
                           verdict.steady_state_high_C, verdict.equilibrium_time_min),
               verdict.channel);
-        server_.publish("declaration", verdict_to_json(verdict));
+        server_.publish("declaration", json);
     }
 }
 

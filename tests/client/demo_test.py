@@ -4,8 +4,12 @@ import pathlib
 import signal
 import sqlite3
 import subprocess
+import sys
 import tempfile
 import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "peers"))
+from waiting import wait_until  # noqa: E402
 
 CTL = str(pathlib.Path(os.environ["THERMBAL_BIN_DIR"]) / "thermbalctl")
 
@@ -47,9 +51,7 @@ def ctrl_c_leaves_nothing():
     with tempfile.TemporaryDirectory() as scratch:
         demo = start(scratch)
         assert "simulated module" in demo.stdout.readline()
-        give_up = time.monotonic() + 30
-        while len(children_of(demo)) < 2 and time.monotonic() < give_up:
-            time.sleep(0.02)
+        wait_until(lambda: len(children_of(demo)) >= 2, "both programs of the demo", 30)
         programs = children_of(demo)
         assert len(programs) == 2, programs
         demo.send_signal(signal.SIGINT)

@@ -13,21 +13,12 @@ import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "peers"))
 from sim_support import Simulator, skip  # noqa: E402,F401  (re-exported)
+from waiting import wait_until  # noqa: E402
 
 BIN = pathlib.Path(os.environ["THERMBAL_BIN_DIR"])
 SOURCE = pathlib.Path(os.environ["THERMBAL_SOURCE_DIR"])
 DAEMON = str(BIN / "thermbald")
 CTL = str(BIN / "thermbalctl")
-
-
-def wait_until(condition, what, seconds=60):
-    give_up = time.monotonic() + seconds
-    while time.monotonic() < give_up:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.02)
-    raise AssertionError(f"not within {seconds} s: {what}")
 
 
 def toml(value):

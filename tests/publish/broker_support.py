@@ -8,7 +8,9 @@ import socket
 import sqlite3
 import subprocess
 import sys
-import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "peers"))
+from waiting import wait_until  # noqa: E402
 
 BIN = pathlib.Path(os.environ["THERMBAL_BIN_DIR"])
 SOURCE = pathlib.Path(os.environ["THERMBAL_SOURCE_DIR"])
@@ -22,16 +24,6 @@ def skip_without_mosquitto():
     if BROKER is None or shutil.which("mosquitto_sub") is None:
         print("skipped: mosquitto or mosquitto-clients is not installed")
         sys.exit(77)
-
-
-def wait_until(condition, what, seconds=30):
-    give_up = time.monotonic() + seconds
-    while time.monotonic() < give_up:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.05)
-    raise AssertionError(f"not within {seconds} s: {what}")
 
 
 def free_port():

@@ -26,7 +26,7 @@ def everything_arrives():
         done = Publisher(folder, configuration(folder, broker.port), "--once")
         assert done.process.wait(30) == 0, done.log()
         stored = stored_samples(f"{folder}/0.db")
-        wait_until(lambda: len(received_samples(subscriber.messages())) == len(stored), "all scans arrive")
+        wait_until(lambda: len(received_samples(subscriber.messages())) == len(stored), "all scans arrive", 30)
         subscriber.stop()
         messages = subscriber.messages()
         assert received_samples(messages) == stored
@@ -46,7 +46,7 @@ def everything_arrives():
         late = Subscriber(folder, broker.port, name="late")
         again = Publisher(folder, configuration(folder, broker.port), "--once")
         assert again.process.wait(30) == 0, again.log()
-        wait_until(lambda: of_topic(late.messages(), "thermbal/VMC 850/test"), "the retained test")
+        wait_until(lambda: of_topic(late.messages(), "thermbal/VMC 850/test"), "the retained test", 30)
         time.sleep(0.3)
         late.stop()
         assert not received_samples(late.messages())
@@ -60,7 +60,7 @@ def nothing_is_lost_when_both_die():
         config = configuration(folder, broker.port)
         writer = write_databases(folder, 1, 400, 15)
         publisher = Publisher(folder, config)
-        wait_until(lambda: len(received_samples(subscriber.messages())) > 20, "the first scans arrive")
+        wait_until(lambda: len(received_samples(subscriber.messages())) > 20, "the first scans arrive", 30)
         for death in range(2):
             broker.kill()
             time.sleep(0.4)
@@ -68,7 +68,7 @@ def nothing_is_lost_when_both_die():
                 publisher.kill()
                 publisher = Publisher(folder, config)
             broker.start()
-            wait_until(lambda: "connected" in publisher.log(), "connected again")
+            wait_until(lambda: "connected" in publisher.log(), "connected again", 30)
             time.sleep(0.8)
         assert writer.wait(60) == 0
         stored = stored_samples(f"{folder}/0.db")
@@ -83,9 +83,9 @@ def a_dead_publisher_is_told():
         subscriber = Subscriber(folder, broker.port, topic="thermbal/+/status")
         assert write_databases(folder, 1, 4, 1).wait(30) == 0
         publisher = Publisher(folder, configuration(folder, broker.port))
-        wait_until(lambda: any(one["online"] for _, _, one in subscriber.messages()), "online")
+        wait_until(lambda: any(one["online"] for _, _, one in subscriber.messages()), "online", 30)
         publisher.kill()
-        wait_until(lambda: not subscriber.messages()[-1][2]["online"], "the last will")
+        wait_until(lambda: not subscriber.messages()[-1][2]["online"], "the last will", 30)
         assert subscriber.messages()[0][2]["daemon"] == "away"
         subscriber.stop()
 
@@ -96,7 +96,7 @@ def a_hostile_name_is_one_level():
         assert write_databases(folder, 1, 4, 1).wait(30) == 0
         config = configuration(folder, broker.port, machine="hall/3 +#\t\"x")
         assert Publisher(folder, config, "--once").process.wait(30) == 0
-        topics = {topic for _, topic, _ in wait_until(subscriber.messages, "messages")}
+        topics = {topic for _, topic, _ in wait_until(subscriber.messages, "messages", 30)}
         subscriber.stop()
         assert all(topic.startswith('thermbal/hall%2F3 %2B%23%09"x/') for topic in topics), topics
 
@@ -135,7 +135,7 @@ def tls_certificate_and_password():
                                           "password_file": "credential:broker-password"})):
                 refused = Publisher(folder, configuration(folder, broker.port, mqtt=mqtt), name=name,
                                     environment={"CREDENTIALS_DIRECTORY": folder})
-                wait_until(lambda: "warning" in refused.log() or refused.process.poll() is not None, "it says why")
+                wait_until(lambda: "warning" in refused.log() or refused.process.poll() is not None, "it says why", 30)
                 refused.kill()
             granted = Publisher(
                 folder, configuration(folder, broker.port, mqtt={
@@ -143,7 +143,7 @@ def tls_certificate_and_password():
                 name="granted", environment={"CREDENTIALS_DIRECTORY": folder})
             assert granted.process.wait(30) == 0, granted.log()
             stored = stored_samples(f"{folder}/0.db")
-            wait_until(lambda: received_samples(subscriber.messages()) == stored, "all scans over TLS")
+            wait_until(lambda: received_samples(subscriber.messages()) == stored, "all scans over TLS", 30)
             subscriber.stop()
         for log in pathlib.Path(folder).glob("*.log"):
             assert "s3cret" not in log.read_text(encoding="utf-8", errors="replace"), log

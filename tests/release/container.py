@@ -5,8 +5,11 @@ import os
 import pathlib
 import shutil
 import subprocess
+import sys
 import tempfile
-import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "peers"))
+from waiting import wait_until  # noqa: E402
 
 INCLUDE = "systemd,systemd-sysv,dbus,procps,python3-minimal,libpython3-stdlib"
 MISSING = 77
@@ -92,16 +95,12 @@ class Container:
 
     @staticmethod
     def wait_for(condition, what, seconds):
-        give_up = time.monotonic() + seconds
-        while time.monotonic() < give_up:
+        def holds():
             try:
-                value = condition()
+                return condition()
             except subprocess.CalledProcessError:
-                value = None
-            if value:
-                return value
-            time.sleep(0.3)
-        raise AssertionError(f"not within {seconds} s: {what}")
+                return None
+        return wait_until(holds, what, seconds, every_s=0.3)
 
     def attempt(self, command, seconds=300):
         return subprocess.run(["nsenter", "-t", str(self.leader), "-m", "-u", "-i", "-n", "-p", "-C", "--wd=/", "--",

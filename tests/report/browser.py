@@ -8,6 +8,9 @@ import sys
 import tempfile
 import time
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "peers"))
+from waiting import wait_until  # noqa: E402
+
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 
@@ -118,7 +121,7 @@ class Browser:
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
             port_file = pathlib.Path(self.folder, "DevToolsActivePort")
-            self.until_plain(lambda: port_file.exists() and port_file.read_text().count("\n") >= 1, 60, "chromium to start")
+            wait_until(lambda: port_file.exists() and port_file.read_text().count("\n") >= 1, "chromium to start", 60)
             port, path = port_file.read_text().split("\n")[:2]
             self.socket = websocket.create_connection(f"ws://127.0.0.1:{port}{path}", timeout=60)
         except BaseException:
@@ -135,14 +138,6 @@ class Browser:
             self.process.kill()
             self.process.wait()
         shutil.rmtree(self.folder, ignore_errors=True)
-
-    @staticmethod
-    def until_plain(holds, limit_s, what):
-        end = time.monotonic() + limit_s
-        while not holds():
-            if time.monotonic() > end:
-                raise AssertionError(f"waited {limit_s} s for {what}")
-            time.sleep(0.02)
 
     def until(self, holds, limit_s, what):
         end = time.monotonic() + limit_s

@@ -7,6 +7,7 @@
 #include <random>
 #include <string>
 
+#include "compute/declaration_record.hpp"
 #include "declaration/course.hpp"
 #include "declaration/live_flow.hpp"
 #include "report/verdict_json.hpp"
@@ -134,20 +135,7 @@ void declare(Store& store, TestId id, std::int64_t window_end_scan, bool hostile
         identified.push_back(
             {verdict.channel, window_end_scan, begun.wall_ns + window_end_scan * period_ns, json});
         if (!verdict.declared()) continue;
-        must(store.record_declaration(id, {.channel = verdict.channel,
-                                           .window_end_scan = window_end_scan,
-                                           .declared_at_min = verdict.declared_at_min,
-                                           .n = verdict.n,
-                                           .C = verdict.svr.C,
-                                           .sigma = verdict.svr.sigma,
-                                           .steady_state_C = verdict.steady_state_C,
-                                           .steady_state_low_C = verdict.steady_state_low_C,
-                                           .steady_state_high_C = verdict.steady_state_high_C,
-                                           .equilibrium_time_min = verdict.equilibrium_time_min,
-                                           .rmse_by_n_C = verdict.rmse_by_n_C,
-                                           .basis_json = json,
-                                           .version = "0.1.0",
-                                           .withdrawn = ""}));
+        must(store.record_declaration(id, declaration_record(verdict, window_end_scan, json, "0.1.0")));
     }
     must(store.record_identifications(id, identified));
 }
