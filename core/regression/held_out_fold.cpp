@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "regression/vector_loops.hpp"
+
 namespace thermbal {
 namespace {
 
@@ -28,17 +30,21 @@ std::vector<Index> feature_rows(const std::vector<std::size_t>& rows, std::size_
 
 }  // namespace
 
-HeldOutFold::HeldOutFold(const KernelFeatures& kernel, const Fold& fold, const VectorXd& targets,
-                         double epsilon)
-    : solver_(kernel.features(feature_rows(fold.training_rows, kernel.stride), Eigen::all),
+HeldOutFold::HeldOutFold(const KernelFeatures& kernel, NewtonSystem& system, const Fold& fold,
+                         const VectorXd& targets, double epsilon)
+    : solver_(system, feature_rows(fold.training_rows, kernel.stride),
               targets(problem_rows(fold.training_rows, kernel.stride)), epsilon),
-      held_out_(kernel.features(feature_rows(fold.held_out_rows, kernel.stride), Eigen::all)),
+      by_row_(&system.by_row()),
+      held_out_(feature_rows(fold.held_out_rows, kernel.stride)),
       held_out_targets_(targets(problem_rows(fold.held_out_rows, kernel.stride))) {}
 
 double HeldOutFold::rmse_at(double smoothing) {
     if (!solver_.descend_to(smoothing, quick_steps)) descend_patiently(smoothing);
-    const VectorXd error =
-        ((held_out_ * solver_.state().weights).array() + solver_.state().bias).matrix() - held_out_targets_;
+    const TubeSolver::State& state = solver_.state();
+    VectorXd error(held_out_targets_.size());
+    vector_loops::multiply_rows(by_row_->data(), static_cast<std::size_t>(by_row_->rows()), held_out_,
+                                state.weights.data(), state.bias, error.data());
+    error -= held_out_targets_;
     return std::sqrt(error.squaredNorm() / static_cast<double>(error.size()));
 }
 

@@ -7,6 +7,7 @@
 
 #include "regression/folds.hpp"
 #include "regression/kernel_features.hpp"
+#include "regression/newton_system.hpp"
 #include "regression/tube_solver.hpp"
 
 namespace thermbal {
@@ -15,9 +16,9 @@ namespace thermbal {
 /// have. One object a thread.
 class HeldOutFold {
   public:
-    /// `targets`: one a row of the problem.
-    HeldOutFold(const KernelFeatures& kernel, const Fold& fold, const Eigen::VectorXd& targets,
-                double epsilon);
+    /// `targets`: one a row of the problem. `system`, on `kernel`'s features, must outlive it.
+    HeldOutFold(const KernelFeatures& kernel, NewtonSystem& system, const Fold& fold,
+                const Eigen::VectorXd& targets, double epsilon);
 
     void start(double C, const TubeSolver::State& from) { solver_.start(C, from); }
     /// Goes on to this smoothing of the loss; the root of the held-out mean squared error there, [0, 1]
@@ -30,7 +31,8 @@ class HeldOutFold {
     void descend_patiently(double smoothing);
 
     TubeSolver solver_;
-    Eigen::MatrixXd held_out_;
+    const Eigen::MatrixXd* by_row_;
+    std::vector<Eigen::Index> held_out_;
     Eigen::VectorXd held_out_targets_;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <limits>
+#include <numeric>
 #include <optional>
 
 #include <Eigen/Dense>
@@ -26,6 +27,12 @@ constexpr TubeSolver::Schedule exact{
 constexpr double wide_tolerance_factor = 1000.0;
 constexpr double exact_tolerance_factor = 0.01;
 
+std::vector<Eigen::Index> all_rows(const VectorXd& targets) {
+    std::vector<Eigen::Index> rows(static_cast<std::size_t>(targets.size()));
+    std::iota(rows.begin(), rows.end(), Eigen::Index{0});
+    return rows;
+}
+
 /// Where a fit on `kernel` may start from. While the smoothing is wide most rows bend, and a step costs the
 /// square of the features: that much is done on fewer of them. The optimum is the same from wherever one
 /// comes.
@@ -33,7 +40,8 @@ TubeSolver::State near_the_optimum(const LagProblem& problem, const KernelFeatur
                                    const VectorXd& targets, double C, double sigma, double epsilon) {
     const KernelFeatures few =
         kernel_features(problem, sigma, wide_tolerance_factor * feature_tolerance(sigma));
-    TubeSolver solver(few.features, targets, epsilon);
+    NewtonSystem system(few.by_row);
+    TubeSolver solver(system, all_rows(targets), targets, epsilon);
     static_cast<void>(solver.fit(C, solver.cold_start(), wide));
     const TubeSolver::State& found = solver.state();
     return {weights_of(kernel, few.pivots, pivot_coefficients(few, found.weights)), found.bias};
@@ -154,7 +162,8 @@ Result<SvrModel> fit_model_low_rank(const LagProblem& problem, double C, double 
         kernel_features(problem, sigma, exact_tolerance_factor * feature_tolerance(sigma));
     const Eigen::Map<const VectorXd> targets(problem.targets().data(),
                                              static_cast<Eigen::Index>(problem.rows()));
-    TubeSolver solver(kernel.features, targets, options.epsilon);
+    NewtonSystem system(kernel.by_row);
+    TubeSolver solver(system, all_rows(targets), targets, options.epsilon);
     const TubeSolver::State start = near_the_optimum(problem, kernel, targets, C, sigma, options.epsilon);
     if (!solver.fit(C, start, exact)) {
         return fail(NextStep::stop,

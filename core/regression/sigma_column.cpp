@@ -95,7 +95,8 @@ Result<std::vector<SigmaCandidate>> SigmaColumn::look_for_candidates(double best
                                                                      const Cancelled& cancelled) {
     const std::size_t stride = std::max<std::size_t>(1, problem_.rows() / rough_rows);
     rough_ = kernel_features(problem_, sigma_, rough_tolerance_factor * feature_tolerance(sigma_), stride);
-    HeldOutFold first(rough_, folds_[0], targets_, options_.epsilon);
+    NewtonSystem system(rough_.by_row);
+    HeldOutFold first(rough_, system, folds_[0], targets_, options_.epsilon);
     const double hopeless = hopeless_rmse(best_mean_mse, folds_.size());
     TubeSolver::State state = first.solver().cold_start();
     double largest_coefficient = std::numeric_limits<double>::infinity();
@@ -140,16 +141,13 @@ Result<std::optional<double>> SigmaColumn::mean_mse(const SigmaCandidate& candid
 
 std::size_t SigmaColumn::kept_numbers() const {
     if (!kernel_) return 0;
-    const auto numbers = static_cast<std::size_t>(kernel_->features.size());
-    // Every fold has its rows twice, by feature and by row.
-    return numbers + 2 * numbers *
-                         static_cast<std::size_t>(std::ranges::count_if(
-                             fitted_, [](const auto& fold) { return fold.has_value(); }));
+    return static_cast<std::size_t>(kernel_->by_row.size()) + system_->kept_numbers();
 }
 
 void SigmaColumn::release() {
-    kernel_.reset();
     for (auto& fold : fitted_) fold.reset();
+    system_.reset();
+    kernel_.reset();
 }
 
 /// The first fold from where it was roughly, the others from the first.
@@ -161,12 +159,16 @@ void SigmaColumn::start_fold(std::size_t f, const SigmaCandidate& candidate) {
 const KernelFeatures& SigmaColumn::kernel() {
     if (!kernel_) {
         kernel_ = kernel_features(problem_, sigma_, fine_tolerance_factor * feature_tolerance(sigma_));
+        system_.emplace(kernel_->by_row);
     }
     return *kernel_;
 }
 
 HeldOutFold& SigmaColumn::fold(std::size_t f) {
-    if (!fitted_[f]) fitted_[f].emplace(kernel(), folds_[f], targets_, options_.epsilon);
+    if (!fitted_[f]) {
+        const KernelFeatures& features = kernel();
+        fitted_[f].emplace(features, *system_, folds_[f], targets_, options_.epsilon);
+    }
     return *fitted_[f];
 }
 

@@ -62,6 +62,7 @@ class SigmaColumn {
     Eigen::VectorXd targets_;
     KernelFeatures rough_;
     std::optional<KernelFeatures> kernel_;
+    std::optional<NewtonSystem> system_;  ///< of all folds
     std::vector<std::optional<HeldOutFold>> fitted_;
 };
 

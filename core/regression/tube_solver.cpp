@@ -5,36 +5,36 @@
 #include <limits>
 #include <utility>
 
-#include <Eigen/Dense>
-
 #include "base/median.hpp"
 
 namespace thermbal {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-TubeSolver::TubeSolver(MatrixXd features, VectorXd targets, double epsilon)
-    : features_(std::move(features)),
-      by_row_(features_.transpose()),
+TubeSolver::TubeSolver(NewtonSystem& system, std::vector<Index> rows, VectorXd targets, double epsilon)
+    : system_(&system),
+      rows_(std::move(rows)),
       targets_(std::move(targets)),
       epsilon_(epsilon),
       residuals_(targets_.size()),
       slopes_(VectorXd::Zero(targets_.size())),
       new_slopes_(targets_.size()),
-      slope_sum_(VectorXd::Zero(features_.cols())),
+      slope_sum_(VectorXd::Zero(system.by_row().rows())),
       change_(targets_.size()) {}
 
 TubeSolver::State TubeSolver::cold_start() const {
-    return {VectorXd::Zero(features_.cols()), upper_median({targets_.begin(), targets_.end()})};
+    return {VectorXd::Zero(slope_sum_.size()), upper_median({targets_.begin(), targets_.end()})};
+}
+
+void TubeSolver::predict_rows(const VectorXd& weights, double bias, VectorXd& out) const {
+    vector_loops::multiply_rows(system_->by_row().data(), static_cast<std::size_t>(weights.size()), rows_,
+                                weights.data(), bias, out.data());
 }
 
 void TubeSolver::start(double C, const State& start) {
     state_ = start;
-    vector_loops::multiply_columns(features_.data(), static_cast<std::size_t>(features_.rows()),
-                                   static_cast<std::size_t>(features_.cols()), state_.weights.data(),
-                                   state_.bias, residuals_.data());
+    predict_rows(state_.weights, state_.bias, residuals_);
     residuals_ = targets_ - residuals_;
     // Rows that C holds back stay held back: their slopes grow with it.
     slopes_ *= C / tube_.C;
@@ -72,13 +72,11 @@ bool TubeSolver::descend(double smoothing, double still, int most_steps) {
         gradient_ = state_.weights - slope_sum_;
         bias_gradient_ = -slopes_.sum();
         newton_direction();
-        vector_loops::multiply_columns(features_.data(), static_cast<std::size_t>(features_.rows()),
-                                       static_cast<std::size_t>(features_.cols()), direction_.data(),
-                                       bias_direction_, change_.data());
+        predict_rows(direction_.weights, direction_.bias, change_);
         const double length = step_length();
         if (length == 0.0) return true;
-        state_.weights += length * direction_;
-        state_.bias += length * bias_direction_;
+        state_.weights += length * direction_.weights;
+        state_.bias += length * direction_.bias;
         residuals_ -= length * change_;
         if (change_.lpNorm<Eigen::Infinity>() <= still) return true;
     }
@@ -91,66 +89,38 @@ void TubeSolver::take_slopes() {
     vector_loops::loss_slopes(residuals_.data(), static_cast<std::size_t>(residuals_.size()), tube_,
                               new_slopes_.data());
     bending_.clear();
+    changed_.clear();
+    slope_changes_.clear();
     for (Index i = 0; i < slopes_.size(); ++i) {
+        const Index row = rows_[static_cast<std::size_t>(i)];
         const double slope = new_slopes_(i);
         const double size = std::abs(slope);
-        if (size > 0.0 && size < tube_.C) bending_.push_back(i);
+        if (size > 0.0 && size < tube_.C) bending_.push_back(row);
         if (slope == slopes_(i)) continue;
-        slope_sum_ += (slope - slopes_(i)) * by_row_.col(i);
+        changed_.push_back(row);
+        slope_changes_.push_back(slope - slopes_(i));
         slopes_(i) = slope;
     }
+    vector_loops::add_rows(system_->by_row().data(), static_cast<std::size_t>(slope_sum_.size()), changed_,
+                           slope_changes_, slope_sum_.data());
 }
 
-/// Solves (I + k X'X) d + k X'1 e = -g, k 1'(X d + 1 e) = -g_b, X the rows where the loss bends, k their
-/// curvature: in the space of the features or in that of the rows, whichever is smaller.
 void TubeSolver::newton_direction() {
     const double curvature = tube_.C / tube_.smoothing;
-    const auto rows = static_cast<Index>(bending_.size());
-    if (rows == 0) {
-        direction_ = -gradient_;
-        bias_direction_ = -bias_gradient_ / (1e-3 * curvature);
-    } else if (rows > features_.cols()) {
-        direction_in_feature_space(curvature);
+    if (bending_.empty()) {
+        direction_ = {-gradient_, -bias_gradient_ / (1e-3 * curvature)};
     } else {
-        direction_in_row_space(curvature);
+        system_->solve(bending_, curvature, gradient_, bias_gradient_, direction_);
     }
-}
-
-void TubeSolver::direction_in_feature_space(double curvature) {
-    const Index rank = features_.cols();
-    const auto rows = static_cast<double>(bending_.size());
-    const MatrixXd& gram = feature_gram_.over(by_row_, bending_);
-    VectorXd mean = VectorXd::Zero(rank);
-    for (const Index row : bending_) mean += by_row_.col(row);
-    mean /= rows;
-    system_ = curvature * gram.topLeftCorner(rank, rank);
-    system_.selfadjointView<Eigen::Lower>().rankUpdate(mean, -curvature * rows);
-    system_.diagonal().array() += 1.0;
-    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(system_);
-    direction_ = factor.solve(mean * bias_gradient_ - gradient_);
-    bias_direction_ = -bias_gradient_ / (curvature * rows) - mean.dot(direction_);
-}
-
-void TubeSolver::direction_in_row_space(double curvature) {
-    const auto rows = static_cast<Index>(bending_.size());
-    bent_.resize(features_.cols(), rows);
-    for (Index k = 0; k < rows; ++k) bent_.col(k) = by_row_.col(bending_[static_cast<std::size_t>(k)]);
-    system_ = row_gram_.over(bent_, bending_);
-    system_.diagonal().array() += 1.0 / curvature;
-    const Eigen::LLT<Eigen::Ref<MatrixXd>> factor(system_);
-    const VectorXd without_bias = factor.solve(-(bent_.transpose() * gradient_));
-    const VectorXd of_bias = factor.solve(VectorXd::Ones(rows));
-    bias_direction_ = (-bias_gradient_ - without_bias.sum()) / of_bias.sum();
-    direction_ = -gradient_ - bent_ * (without_bias + bias_direction_ * of_bias);
 }
 
 /// The objective along the direction is convex and piecewise quadratic: safeguarded Newton to a slope a fifth
 /// of the first.
 double TubeSolver::step_length() {
-    const double first_slope = gradient_.dot(direction_) + bias_gradient_ * bias_direction_;
+    const double first_slope = gradient_.dot(direction_.weights) + bias_gradient_ * direction_.bias;
     if (!(first_slope < 0.0)) return 0.0;
-    const double along = state_.weights.dot(direction_);
-    const double square = direction_.squaredNorm();
+    const double along = state_.weights.dot(direction_.weights);
+    const double square = direction_.weights.squaredNorm();
     const double enough = 0.2 * std::abs(first_slope);
     double low = 0.0;
     double high = std::numeric_limits<double>::infinity();
@@ -209,7 +179,7 @@ double TubeSolver::duality_gap() const {
         feasible(i) -= taken;
         left_over -= taken;
     }
-    const VectorXd weights = by_row_ * feasible;
+    const VectorXd weights = system_->by_row()(Eigen::all, rows_) * feasible;
     const double dual =
         targets_.dot(feasible) - epsilon_ * feasible.lpNorm<1>() - 0.5 * weights.squaredNorm();
     return primal - dual;

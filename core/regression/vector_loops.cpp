@@ -7,12 +7,7 @@
 #include <cstdint>
 #include <cstring>
 
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define THERMBAL_EVERY_WIDTH __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define THERMBAL_EVERY_WIDTH
-#endif
+#include "regression/every_width.hpp"
 
 namespace thermbal::vector_loops {
 namespace {
@@ -55,71 +50,55 @@ inline double total(const Lanes& sums) {
 }  // namespace
 
 THERMBAL_EVERY_WIDTH
-void multiply_columns(const double* __restrict matrix, std::size_t rows, std::size_t columns,
-                      const double* __restrict factor, double constant, double* __restrict out) {
-    for (std::size_t i = 0; i < rows; ++i) out[i] = constant;
-    std::size_t k = 0;
-    for (; k + 4 <= columns; k += 4) {
-        const double* a = matrix + k * rows;
-        const double* b = a + rows;
-        const double* c = b + rows;
-        const double* d = c + rows;
-        for (std::size_t i = 0; i < rows; ++i) {
-            out[i] +=
-                (factor[k] * a[i] + factor[k + 1] * b[i]) + (factor[k + 2] * c[i] + factor[k + 3] * d[i]);
+void multiply_rows(const double* __restrict matrix, std::size_t length, std::span<const std::ptrdiff_t> rows,
+                   const double* __restrict factor, double constant, double* __restrict out) {
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        const double* const row = matrix + static_cast<std::size_t>(rows[i]) * length;
+        Lanes sums{};
+        for (std::size_t k = 0; k < length; k += lanes) {
+            for (std::size_t lane = 0; lane < lanes; ++lane) sums[lane] += factor[k + lane] * row[k + lane];
         }
-    }
-    for (; k < columns; ++k) {
-        const double* a = matrix + k * rows;
-        for (std::size_t i = 0; i < rows; ++i) out[i] += factor[k] * a[i];
+        out[i] = constant + total(sums);
     }
 }
 
 THERMBAL_EVERY_WIDTH
-void subtract_columns(const double* __restrict matrix, std::size_t rows, std::size_t columns,
+void add_rows(const double* __restrict matrix, std::size_t length, std::span<const std::ptrdiff_t> rows,
+              std::span<const double> factors, double* __restrict out) {
+    std::size_t i = 0;
+    for (; i + 4 <= rows.size(); i += 4) {
+        const double* const a = matrix + static_cast<std::size_t>(rows[i]) * length;
+        const double* const b = matrix + static_cast<std::size_t>(rows[i + 1]) * length;
+        const double* const c = matrix + static_cast<std::size_t>(rows[i + 2]) * length;
+        const double* const d = matrix + static_cast<std::size_t>(rows[i + 3]) * length;
+        for (std::size_t k = 0; k < length; ++k) {
+            out[k] +=
+                (factors[i] * a[k] + factors[i + 1] * b[k]) + (factors[i + 2] * c[k] + factors[i + 3] * d[k]);
+        }
+    }
+    for (; i < rows.size(); ++i) {
+        const double* const a = matrix + static_cast<std::size_t>(rows[i]) * length;
+        for (std::size_t k = 0; k < length; ++k) out[k] += factors[i] * a[k];
+    }
+}
+
+THERMBAL_EVERY_WIDTH
+void subtract_columns(const double* const* matrix, std::size_t rows, std::size_t columns,
                       const double* __restrict factor, double* __restrict out) {
     std::size_t k = 0;
     for (; k + 4 <= columns; k += 4) {
-        const double* a = matrix + k * rows;
-        const double* b = a + rows;
-        const double* c = b + rows;
-        const double* d = c + rows;
+        const double* __restrict a = matrix[k];
+        const double* __restrict b = matrix[k + 1];
+        const double* __restrict c = matrix[k + 2];
+        const double* __restrict d = matrix[k + 3];
         for (std::size_t i = 0; i < rows; ++i) {
             out[i] -=
                 (factor[k] * a[i] + factor[k + 1] * b[i]) + (factor[k + 2] * c[i] + factor[k + 3] * d[i]);
         }
     }
     for (; k < columns; ++k) {
-        const double* a = matrix + k * rows;
+        const double* __restrict a = matrix[k];
         for (std::size_t i = 0; i < rows; ++i) out[i] -= factor[k] * a[i];
-    }
-}
-
-/// Blocks of 8 x 4 elements stay in registers over all vectors.
-THERMBAL_EVERY_WIDTH
-void add_outer_products(const double* __restrict vectors, std::size_t length, std::size_t count, double sign,
-                        double* __restrict lower) {
-    constexpr std::size_t block_columns = 4;
-    for (std::size_t j = 0; j < length; j += block_columns) {
-        for (std::size_t i = j / lanes * lanes; i < length; i += lanes) {
-            std::array<Lanes, block_columns> sums{};
-            for (std::size_t v = 0; v < count; ++v) {
-                const double* vector = vectors + v * length;
-                // Copied, not read in place: g++ 12 reads eight where four are meant, past the last vector's
-                // end.
-                std::array<double, block_columns> factor;
-                std::memcpy(factor.data(), vector + j, sizeof factor);
-                for (std::size_t c = 0; c < block_columns; ++c) {
-                    for (std::size_t lane = 0; lane < lanes; ++lane) {
-                        sums[c][lane] += factor[c] * vector[i + lane];
-                    }
-                }
-            }
-            for (std::size_t c = 0; c < block_columns; ++c) {
-                double* column = lower + (j + c) * length + i;
-                for (std::size_t lane = 0; lane < lanes; ++lane) column[lane] += sign * sums[c][lane];
-            }
-        }
     }
 }
 

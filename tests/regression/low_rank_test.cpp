@@ -11,6 +11,7 @@
 #include "regression/grid_search.hpp"
 #include "regression/kernel.hpp"
 #include "regression/kernel_features.hpp"
+#include "regression/newton_system.hpp"
 #include "regression/tube_solver.hpp"
 #include "regression/vector_loops.hpp"
 #include "windows.hpp"
@@ -51,15 +52,20 @@ TEST(VectorLoops, GaussiansAreSummedAsByTheStandardLibrary) {
     }
 }
 
-TEST(VectorLoops, OuterProductsAddUpInTheLowerTriangle) {
+TEST(VectorLoops, RowsAreMultipliedAndAddedUp) {
+    const std::vector<Index> rows{1, 2, 5, 6, 8, 9, 12};
     for (const Index length : {8, 16, 40}) {
-        const MatrixXd vectors = MatrixXd::Random(length, 11);
-        MatrixXd lower = MatrixXd::Ones(length, length);
-        vector_loops::add_outer_products(vectors.data(), static_cast<std::size_t>(length), 11, 1.0,
-                                         lower.data());
-        const MatrixXd expected = MatrixXd::Ones(length, length) + vectors * vectors.transpose();
-        const MatrixXd off = (lower - expected).triangularView<Eigen::Lower>();
-        EXPECT_LT(off.cwiseAbs().maxCoeff(), 1e-13);
+        const MatrixXd by_row = MatrixXd::Random(length, 13);
+        const MatrixXd chosen = by_row(Eigen::all, rows);
+        const VectorXd factor = VectorXd::Random(length);
+        VectorXd products(7);
+        vector_loops::multiply_rows(by_row.data(), static_cast<std::size_t>(length), rows, factor.data(), 0.5,
+                                    products.data());
+        EXPECT_LT((products - chosen.transpose() * factor - VectorXd::Constant(7, 0.5)).norm(), 1e-13);
+        VectorXd sum = factor;
+        const std::vector<double> factors{0.1, -2.0, 0.0, 4.0, 1.0, 3.0, -1.0};
+        vector_loops::add_rows(by_row.data(), static_cast<std::size_t>(length), rows, factors, sum.data());
+        EXPECT_LT((sum - factor - chosen * Eigen::Map<const VectorXd>(factors.data(), 7)).norm(), 1e-13);
     }
 }
 
@@ -99,7 +105,7 @@ TEST(KernelFeatures, MultiplyToTheKernel) {
                 for (std::size_t row = 0; row < problem.rows(); row += stride)
                     rows.push_back(static_cast<Index>(row));
                 const MatrixXd kernel = kernel_of(problem, sigma)(rows, rows);
-                const MatrixXd product = features.features * features.features.transpose();
+                const MatrixXd product = features.by_row.transpose() * features.by_row;
                 EXPECT_LT((kernel - product).cwiseAbs().maxCoeff(), 1.001e-9);
             }
         }
@@ -110,10 +116,10 @@ TEST(KernelFeatures, CarryAFunctionToOtherFeatures) {
     const auto problem = *make_lag_problem(testing::filtered_warm_up(testing::two_constants, 200, 2), 5, 0.0);
     const auto rough = kernel_features(problem, 4.0, 1e-8, 4);
     const auto fine = kernel_features(problem, 4.0, 1e-11, 1);
-    const VectorXd weights = VectorXd::LinSpaced(rough.features.cols(), -1.0, 1.0);
+    const VectorXd weights = VectorXd::LinSpaced(rough.by_row.rows(), -1.0, 1.0);
     const VectorXd carried = weights_of(fine, rough.pivots, pivot_coefficients(rough, weights));
-    for (Index k = 0; k < rough.features.rows(); ++k) {
-        EXPECT_NEAR(rough.features.row(k).dot(weights), fine.features.row(4 * k).dot(carried), 1e-4);
+    for (Index k = 0; k < rough.by_row.cols(); ++k) {
+        EXPECT_NEAR(rough.by_row.col(k).dot(weights), fine.by_row.col(4 * k).dot(carried), 1e-4);
     }
 }
 
@@ -147,7 +153,10 @@ TEST(TubeSolver, TheGapToTheDualObjectiveOnTheFullKernelIsClosed) {
         const auto features = kernel_features(problem, point.sigma, 0.01 * feature_tolerance(point.sigma));
         const VectorXd y =
             Eigen::Map<const VectorXd>(problem.targets().data(), static_cast<Index>(problem.rows()));
-        TubeSolver solver(features.features, y, 0.001);
+        NewtonSystem system(features.by_row);
+        std::vector<Index> all(problem.rows());
+        std::iota(all.begin(), all.end(), Index{0});
+        TubeSolver solver(system, all, y, 0.001);
         ASSERT_TRUE(solver.fit(point.C, solver.cold_start(), to_the_end));
         const VectorXd& c = solver.coefficients();
         EXPECT_LE(c.cwiseAbs().maxCoeff(), point.C);

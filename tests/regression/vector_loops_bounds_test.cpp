@@ -1,5 +1,6 @@
 #include <cstddef>
 #include <cstring>
+#include <numeric>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -43,12 +44,14 @@ class AtTheEdge {
 TEST(VectorLoops, ReadAndWriteNothingBeyondTheirArrays) {
     for (const std::size_t rows : {8, 16, 24, 40, 64, 128}) {
         for (const std::size_t count : {1, 2, 3, 4, 5, 7, 8, 13, 35, 90}) {
-            AtTheEdge matrix(rows * count), square(rows * rows), column(rows), weight(rows), lags(count);
-            vector_loops::add_outer_products(matrix.data(), rows, count, 1.0, square.data());
-            vector_loops::multiply_columns(matrix.data(), rows, count, lags.data(), 0.5, column.data());
-            vector_loops::subtract_columns(matrix.data(), rows, count, lags.data(), column.data());
+            AtTheEdge matrix(rows * count), column(rows), weight(rows), lags(count);
+            std::vector<std::ptrdiff_t> all(count);
+            std::iota(all.begin(), all.end(), std::ptrdiff_t{0});
+            vector_loops::multiply_rows(matrix.data(), rows, all, weight.data(), 0.5, lags.data());
+            vector_loops::add_rows(matrix.data(), rows, all, {lags.data(), count}, column.data());
             std::vector<const double*> lagged;
             for (std::size_t l = 0; l < count; ++l) lagged.push_back(matrix.data() + l * rows);
+            vector_loops::subtract_columns(lagged.data(), rows, count, lags.data(), column.data());
             vector_loops::squared_distances_to(lagged.data(), rows, lags.data(), count, column.data());
             (void)vector_loops::weighted_gaussians(matrix.data(), rows, weight.data(), lags.data(), count,
                                                    -0.5);

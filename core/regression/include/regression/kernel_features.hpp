@@ -10,12 +10,12 @@
 
 namespace thermbal {
 
-/// Every stride-th row of a problem (features.row(k) belongs to row k * stride) under
-/// a Gaussian kernel matrix of low rank: kernel(i, j) = features.row(i) . features.row(j), up to the
+/// Every stride-th row of a problem (column k of by_row belongs to row k * stride) under
+/// a Gaussian kernel matrix of low rank: kernel(i, j) = by_row.col(i) . by_row.col(j), up to the
 /// tolerance it was made with. The lagged rows of a filtered warm-up lie close to a smooth curve, so that 5
 /// to 50 features do for 1600 rows.
 struct KernelFeatures {
-    Eigen::MatrixXd features;         ///< rows / stride, rounded up, x rank
+    Eigen::MatrixXd by_row;  ///< rank, with zeros up to a multiple of eight, x (rows / stride, rounded up)
     std::vector<std::size_t> pivots;  ///< the rows (of the problem) whose kernel functions the features span
     std::size_t stride = 1;
 };
@@ -29,7 +29,8 @@ KernelFeatures kernel_features(const LagProblem& problem, double sigma, double t
 /// coefficients, so theirs is smaller (measured: |c|_1 stays below 250 sigma^2).
 double feature_tolerance(double sigma);
 
-/// c with sum_k c_k k(x_pivot_k, x) = weights . features(x).
+/// c with sum_k c_k k(x_pivot_k, x) = weights . features(x). Weights: as many as by_row has rows, here and
+/// below.
 std::vector<double> pivot_coefficients(const KernelFeatures& kernel, const Eigen::VectorXd& weights);
 
 /// The weights on `features` of the function that has these coefficients at these rows: `features` must hold

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "regression/bending_gram.hpp"
+#include "regression/newton_system.hpp"
 #include "regression/vector_loops.hpp"
 
 namespace thermbal {
@@ -30,8 +30,8 @@ class TubeSolver {
         int most_steps = 100;  ///< of Newton, at one smoothing
     };
 
-    /// `features`: rows x rank.
-    TubeSolver(Eigen::MatrixXd features, Eigen::VectorXd targets, double epsilon);
+    /// On some rows of system.by_row(), ascending, with a target each. `system` must outlive it.
+    TubeSolver(NewtonSystem& system, std::vector<Eigen::Index> rows, Eigen::VectorXd targets, double epsilon);
 
     /// Weights 0, bias the median target.
     State cold_start() const;
@@ -59,13 +59,12 @@ class TubeSolver {
     [[nodiscard]] bool descend(double smoothing, double still, int most_steps);
     void take_slopes();
     void newton_direction();
-    void direction_in_feature_space(double curvature);
-    void direction_in_row_space(double curvature);
+    void predict_rows(const Eigen::VectorXd& weights, double bias, Eigen::VectorXd& out) const;
     double step_length();
     void centre_undetermined_bias();
 
-    Eigen::MatrixXd features_;
-    Eigen::MatrixXd by_row_;  ///< features_ transposed: one row's features side by side
+    NewtonSystem* system_;
+    std::vector<Eigen::Index> rows_;
     Eigen::VectorXd targets_;
     double epsilon_;
 
@@ -73,16 +72,13 @@ class TubeSolver {
     State state_;
     Eigen::VectorXd residuals_;
     Eigen::VectorXd slopes_, new_slopes_;
-    Eigen::VectorXd slope_sum_;          ///< sum of slopes_(i) * row i
+    Eigen::VectorXd slope_sum_;          ///< sum over rows of slope * features
+    std::vector<Eigen::Index> changed_;  ///< rows whose slope has changed, and by how much
+    std::vector<double> slope_changes_;
     std::vector<Eigen::Index> bending_;  ///< rows where the loss is quadratic
-    FeatureGram feature_gram_;
-    RowGram row_gram_;
-    Eigen::MatrixXd bent_;    ///< the features of the bending rows, one column a row
-    Eigen::MatrixXd system_;  ///< of the Newton step
     Eigen::VectorXd gradient_;
     double bias_gradient_ = 0.0;
-    Eigen::VectorXd direction_;
-    double bias_direction_ = 0.0;
+    NewtonSystem::Direction direction_;
     Eigen::VectorXd change_;  ///< of the prediction of every row along the direction
     long newton_steps_ = 0;
 };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 
 /// The loops in which the time goes, compiled once for every width of vector unit and chosen at run time. All
 /// of them give the same bits on every processor: sums have eight fixed lanes, and multiply and add are not
@@ -13,13 +14,18 @@ constexpr std::size_t padded(std::size_t count) {
     return (count + lane_count - 1) / lane_count * lane_count;
 }
 
-/// out[i] = constant + sum over columns k of factor[k] * matrix[i + k * rows].
-void multiply_columns(const double* matrix, std::size_t rows, std::size_t columns, const double* factor,
-                      double constant, double* out);
+/// out[i] = constant + sum over k < length of factor[k] * matrix[rows[i] * length + k]. REQUIRES: length %
+/// lane_count == 0.
+void multiply_rows(const double* matrix, std::size_t length, std::span<const std::ptrdiff_t> rows,
+                   const double* factor, double constant, double* out);
 
-/// out[i] -= sum over columns k of factor[k] * matrix[i + k * rows].
-void subtract_columns(const double* matrix, std::size_t rows, std::size_t columns, const double* factor,
-                      double* out);
+/// out[k] += sum over i of factors[i] * matrix[rows[i] * length + k], for k < length.
+void add_rows(const double* matrix, std::size_t length, std::span<const std::ptrdiff_t> rows,
+              std::span<const double> factors, double* out);
+
+/// out[i] -= sum over columns k of factor[k] * matrix[k][i], for i < rows.
+void subtract_columns(const double* const* matrix, std::size_t rows, std::size_t columns,
+                      const double* factor, double* out);
 
 /// distance[i] = sum over l < lags of (lagged[l][i] - point[l])^2, for i < rows.
 void squared_distances_to(const double* const* lagged, std::size_t rows, const double* point,
@@ -32,12 +38,6 @@ void scaled_exp(double* values, std::size_t count, double factor);
 /// centres[l * count + i]. REQUIRES: count % lane_count == 0.
 double weighted_gaussians(const double* centres, std::size_t count, const double* weight, const double* point,
                           std::size_t lags, double factor);
-
-/// lower += sign * sum over c < count of v_c v_c', v_c = vectors[c * length ...]: the lower triangle of a
-/// length x length matrix, column by column; of what lies above, a part is written, too. REQUIRES: length %
-/// lane_count == 0.
-void add_outer_products(const double* vectors, std::size_t length, std::size_t count, double sign,
-                        double* lower);
 
 /// The epsilon-insensitive loss with its kink smoothed over `smoothing`: its slope is
 /// C * clamp((|residual| - epsilon) / smoothing, 0, 1), with the sign of the residual.

@@ -1,0 +1,214 @@
+#include "regression/newton_system.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <iterator>
+#include <numeric>
+#include <span>
+
+#include "regression/vector_loops.hpp"
+
+namespace thermbal {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Every change leaves a rounding behind.
+constexpr int most_changes = 64;
+
+constexpr std::size_t height = PanelMatrix::height;
+
+/// So many rows' features at a time: they stay in the cache while they are multiplied.
+constexpr std::size_t gathered_at_once = 64;
+
+void difference(const std::vector<Index>& of, const std::vector<Index>& without, std::vector<Index>& out) {
+    out.clear();
+    std::ranges::set_difference(of, without, std::back_inserter(out));
+}
+
+/// Features in panels of eight features, one column a row.
+void gather_columns(const MatrixXd& by_row, std::span<const Index> rows, PanelMatrix& out) {
+    out.resize(static_cast<std::size_t>(by_row.rows()), rows.size());
+    for (std::size_t v = 0; v < rows.size(); ++v) {
+        const double* const features = by_row.col(rows[v]).data();
+        for (std::size_t p = 0; p < out.panels(); ++p) {
+            std::memcpy(out.eight(p, v), features + p * height, height * sizeof(double));
+        }
+    }
+}
+
+/// Features in panels of eight rows, one column a feature.
+void gather_rows(const MatrixXd& by_row, std::span<const Index> rows, PanelMatrix& out) {
+    const auto rank = static_cast<std::size_t>(by_row.rows());
+    out.set_zero(rows.size(), rank);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        const double* const features = by_row.col(rows[i]).data();
+        double* const lane = out.panel(i / height) + i % height;
+        for (std::size_t f = 0; f < rank; ++f) lane[f * height] = features[f];
+    }
+}
+
+/// scale * gram - weight * mean mean' + I, the lower triangle.
+void assemble(const PanelMatrix& gram, double scale, double weight, const VectorXd& mean,
+              PanelMatrix& system) {
+    system.resize(gram.padded_rows(), gram.columns());
+    for (std::size_t p = 0; p < gram.panels(); ++p) {
+        const double* const here = mean.data() + p * height;
+        const double* const from = gram.panel(p);
+        double* const to = system.panel(p);
+        for (std::size_t j = 0; j < (p + 1) * height; ++j) {
+            const double factor = weight * mean.data()[j];
+            for (std::size_t lane = 0; lane < height; ++lane) {
+                to[j * height + lane] = scale * from[j * height + lane] - factor * here[lane];
+            }
+        }
+    }
+    for (std::size_t i = 0; i < system.padded_rows(); ++i) system.at(i, i) += 1.0;
+}
+
+}  // namespace
+
+const PanelMatrix& FeatureGram::over(const MatrixXd& by_row, const std::vector<Index>& bending) {
+    const auto all = static_cast<std::size_t>(by_row.cols());
+    difference(bending, rows_, entering_);
+    difference(rows_, bending, leaving_);
+    const std::size_t changed = entering_.size() + leaving_.size();
+    const std::size_t from_anew = std::min(bending.size(), all - bending.size());
+    if (changed > from_anew || changes_ == most_changes || sum_.numbers() == 0) {
+        if (2 * bending.size() > all) {
+            start_from_all(by_row);
+        } else {
+            start_from_nothing(static_cast<std::size_t>(by_row.rows()));
+        }
+        difference(bending, rows_, entering_);
+        difference(rows_, bending, leaving_);
+        changes_ = 0;
+    }
+    add(by_row, entering_, 1.0, sum_);
+    add(by_row, leaving_, -1.0, sum_);
+    rows_ = bending;
+    ++changes_;
+    return sum_;
+}
+
+void FeatureGram::start_from_nothing(std::size_t rank) {
+    sum_.set_zero(rank, rank);
+    rows_.clear();
+}
+
+void FeatureGram::start_from_all(const MatrixXd& by_row) {
+    const auto rank = static_cast<std::size_t>(by_row.rows());
+    rows_.resize(static_cast<std::size_t>(by_row.cols()));
+    std::iota(rows_.begin(), rows_.end(), Index{0});
+    if (sum_of_all_.numbers() == 0) {
+        sum_of_all_.set_zero(rank, rank);
+        add(by_row, rows_, 1.0, sum_of_all_);
+    }
+    sum_ = sum_of_all_;
+}
+
+void FeatureGram::add(const MatrixXd& by_row, const std::vector<Index>& rows, double sign, PanelMatrix& sum) {
+    const std::span<const Index> all = rows;
+    for (std::size_t first = 0; first < all.size(); first += gathered_at_once) {
+        gather_columns(by_row, all.subspan(first, std::min(gathered_at_once, all.size() - first)), gathered_);
+        add_products(gathered_, sign, sum);
+    }
+}
+
+const PanelMatrix& RowGram::over(const MatrixXd& by_row, const std::vector<Index>& bending) {
+    find_kept_and_fresh(bending);
+    gather_rows(by_row, bending, all_by_row_);
+    if (2 * fresh_.size() > bending.size()) {
+        products_.set_zero(bending.size(), all_by_row_.padded_rows());
+        add_products(all_by_row_, 1.0, products_);
+    } else {
+        bring_up_to_date(by_row, bending);
+    }
+    rows_ = bending;
+    return products_;
+}
+
+void RowGram::find_kept_and_fresh(const std::vector<Index>& bending) {
+    kept_.clear();
+    fresh_.clear();
+    auto old = rows_.begin();
+    for (std::size_t k = 0; k < bending.size(); ++k) {
+        while (old != rows_.end() && *old < bending[k]) ++old;
+        if (old != rows_.end() && *old == bending[k]) {
+            kept_.emplace_back(k, static_cast<std::size_t>(old - rows_.begin()));
+        } else {
+            fresh_.push_back(k);
+        }
+    }
+}
+
+void RowGram::bring_up_to_date(const MatrixXd& by_row, const std::vector<Index>& bending) {
+    new_products_.set_zero(bending.size(), all_by_row_.padded_rows());
+    for (std::size_t r = 0; r < kept_.size(); ++r) {
+        for (std::size_t c = 0; c <= r; ++c) {
+            new_products_.at(kept_[r].first, kept_[c].first) = products_.at(kept_[r].second, kept_[c].second);
+        }
+    }
+    fresh_rows_.clear();
+    for (const std::size_t k : fresh_) fresh_rows_.push_back(bending[k]);
+    gather_rows(by_row, fresh_rows_, fresh_by_row_);
+    products(all_by_row_, fresh_by_row_, of_fresh_);
+    for (std::size_t f = 0; f < fresh_.size(); ++f) {
+        for (std::size_t i = 0; i < bending.size(); ++i) {
+            new_products_.at(std::max(i, fresh_[f]), std::min(i, fresh_[f])) = of_fresh_.at(i, f);
+        }
+    }
+    std::swap(products_, new_products_);
+}
+
+void NewtonSystem::solve(const std::vector<Index>& bending, double curvature, const VectorXd& gradient,
+                         double bias_gradient, Direction& direction) {
+    if (static_cast<Index>(bending.size()) > by_row_.rows()) {
+        in_feature_space(bending, curvature, gradient, bias_gradient, direction);
+    } else {
+        in_row_space(bending, curvature, gradient, bias_gradient, direction);
+    }
+}
+
+void NewtonSystem::in_feature_space(const std::vector<Index>& bending, double curvature,
+                                    const VectorXd& gradient, double bias_gradient, Direction& direction) {
+    const auto rows = static_cast<double>(bending.size());
+    VectorXd mean = VectorXd::Zero(by_row_.rows());
+    vector_loops::add_rows(by_row_.data(), static_cast<std::size_t>(by_row_.rows()), bending,
+                           std::vector<double>(bending.size(), 1.0 / rows), mean.data());
+    assemble(feature_gram_.over(by_row_, bending), curvature, curvature * rows, mean, system_);
+    factor_.factor(system_);
+    direction.weights = mean * bias_gradient - gradient;
+    factor_.solve(direction.weights.data());
+    direction.bias = -bias_gradient / (curvature * rows) - mean.dot(direction.weights);
+}
+
+void NewtonSystem::in_row_space(const std::vector<Index>& bending, double curvature, const VectorXd& gradient,
+                                double bias_gradient, Direction& direction) {
+    const auto rank = static_cast<std::size_t>(by_row_.rows());
+    const auto rows = static_cast<Index>(bending.size());
+    system_ = row_gram_.over(by_row_, bending);
+    for (std::size_t i = 0; i < system_.padded_rows(); ++i) system_.at(i, i) += 1.0 / curvature;
+    factor_.factor(system_);
+    VectorXd without_bias = VectorXd::Zero(static_cast<Index>(system_.padded_rows()));
+    vector_loops::multiply_rows(by_row_.data(), rank, bending, gradient.data(), 0.0, without_bias.data());
+    without_bias *= -1.0;
+    factor_.solve(without_bias.data());
+    VectorXd of_bias = VectorXd::Zero(without_bias.size());
+    of_bias.head(rows).setOnes();
+    factor_.solve(of_bias.data());
+    direction.bias = (-bias_gradient - without_bias.sum()) / of_bias.sum();
+    const VectorXd factors = -without_bias - direction.bias * of_bias;
+    direction.weights = -gradient;
+    vector_loops::add_rows(by_row_.data(), rank, bending, {factors.data(), bending.size()},
+                           direction.weights.data());
+}
+
+std::size_t NewtonSystem::kept_numbers() const {
+    return feature_gram_.kept_numbers() + row_gram_.kept_numbers() + system_.numbers();
+}
+
+}  // namespace thermbal

@@ -1,0 +1,193 @@
+#include "regression/panels.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+
+#include "regression/every_width.hpp"
+
+namespace thermbal {
+namespace {
+
+constexpr std::size_t height = PanelMatrix::height;
+
+using TwoLanes [[gnu::vector_size(16)]] = double;
+using FourLanes [[gnu::vector_size(32)]] = double;
+using EightLanes [[gnu::vector_size(64)]] = double;
+
+/// block(lane, c) += sign * sum over v of a(lane, v) b(c, v), eight lanes, `columns` columns at a time: as
+/// many sums as fit into the registers. Every element is summed up in the order of v, whatever the width.
+template <typename Vector, std::size_t columns>
+[[gnu::always_inline]] inline void add_block_by(const double* a, const double* b, std::size_t depth,
+                                                double sign, double* block) {
+    constexpr std::size_t width = sizeof(Vector) / sizeof(double);
+    constexpr std::size_t vectors = height / width;
+    for (std::size_t first = 0; first < height; first += columns) {
+        std::array<std::array<Vector, vectors>, columns> sums{};
+        for (std::size_t v = 0; v < depth; ++v) {
+            std::array<Vector, vectors> of_a;
+            std::memcpy(&of_a, a + v * height, sizeof of_a);
+            for (std::size_t c = 0; c < columns; ++c) {
+                for (std::size_t k = 0; k < vectors; ++k) sums[c][k] += of_a[k] * b[v * height + first + c];
+            }
+        }
+        for (std::size_t c = 0; c < columns; ++c) {
+            double* const out = block + (first + c) * height;
+            for (std::size_t lane = 0; lane < height; ++lane) {
+                out[lane] += sign * sums[c][lane / width][lane % width];
+            }
+        }
+    }
+}
+
+#ifdef THERMBAL_WIDTHS_OF_X86
+__attribute__((target("avx512f"))) void add_block(const double* a, const double* b, std::size_t depth,
+                                                  double sign, double* block) {
+    add_block_by<EightLanes, 8>(a, b, depth, sign, block);
+}
+__attribute__((target("avx2"))) void add_block(const double* a, const double* b, std::size_t depth,
+                                               double sign, double* block) {
+    add_block_by<FourLanes, 4>(a, b, depth, sign, block);
+}
+__attribute__((target("default")))
+#endif
+void add_block(const double* a, const double* b, std::size_t depth, double sign, double* block) {
+    add_block_by<TwoLanes, 2>(a, b, depth, sign, block);
+}
+
+/// block = block * L'^-1, L the lower triangle of eight columns side by side.
+THERMBAL_EVERY_WIDTH
+void solve_block(const double* __restrict L, const double* __restrict inverse_diagonal,
+                 double* __restrict block) {
+    for (std::size_t c = 0; c < height; ++c) {
+        std::array<double, height> column;
+        std::memcpy(column.data(), block + c * height, sizeof column);
+        for (std::size_t d = 0; d < c; ++d) {
+            const double factor = L[d * height + c];
+            for (std::size_t lane = 0; lane < height; ++lane) {
+                column[lane] -= factor * block[d * height + lane];
+            }
+        }
+        for (std::size_t lane = 0; lane < height; ++lane) {
+            block[c * height + lane] = column[lane] * inverse_diagonal[c];
+        }
+    }
+}
+
+/// out(lane) -= sum over j of panel(lane, j) x(j).
+THERMBAL_EVERY_WIDTH
+void subtract_product(const double* __restrict panel, std::size_t columns, const double* __restrict x,
+                      double* __restrict out) {
+    static_assert(height % 4 == 0);
+    std::array<std::array<double, height>, 4> sums{};
+    for (std::size_t j = 0; j < columns; j += 4) {
+        for (std::size_t k = 0; k < 4; ++k) {
+            for (std::size_t lane = 0; lane < height; ++lane) {
+                sums[k][lane] += panel[(j + k) * height + lane] * x[j + k];
+            }
+        }
+    }
+    for (std::size_t lane = 0; lane < height; ++lane) {
+        out[lane] -= (sums[0][lane] + sums[1][lane]) + (sums[2][lane] + sums[3][lane]);
+    }
+}
+
+/// pending(lane, j) += panel(lane, j) x(lane).
+THERMBAL_EVERY_WIDTH
+void add_scaled(const double* __restrict panel, std::size_t columns, const double* __restrict x,
+                double* __restrict pending) {
+    for (std::size_t j = 0; j < columns; ++j) {
+        for (std::size_t lane = 0; lane < height; ++lane) {
+            pending[j * height + lane] += panel[j * height + lane] * x[lane];
+        }
+    }
+}
+
+}  // namespace
+
+void PanelMatrix::resize(std::size_t rows, std::size_t columns) {
+    panels_ = (rows + height - 1) / height;
+    columns_ = columns;
+    elements_.resize(padded_rows() * columns);
+}
+
+void PanelMatrix::set_zero(std::size_t rows, std::size_t columns) {
+    resize(rows, columns);
+    std::ranges::fill(elements_, 0.0);
+}
+
+void add_products(const PanelMatrix& V, double sign, PanelMatrix& lower) {
+    for (std::size_t p = 0; p < V.panels(); ++p) {
+        for (std::size_t q = 0; q <= p; ++q) {
+            add_block(V.panel(p), V.panel(q), V.columns(), sign, lower.eight(p, q * height));
+        }
+    }
+}
+
+void products(const PanelMatrix& V, const PanelMatrix& W, PanelMatrix& out) {
+    out.set_zero(V.padded_rows(), W.padded_rows());
+    for (std::size_t p = 0; p < V.panels(); ++p) {
+        for (std::size_t q = 0; q < W.panels(); ++q) {
+            add_block(V.panel(p), W.panel(q), V.columns(), 1.0, out.eight(p, q * height));
+        }
+    }
+}
+
+void PanelCholesky::factor(PanelMatrix& lower) {
+    lower_ = &lower;
+    inverse_diagonal_.resize(lower.padded_rows());
+    for (std::size_t q = 0; q < lower.panels(); ++q) {
+        const std::size_t done = q * height;
+        for (std::size_t p = q; p < lower.panels(); ++p) {
+            add_block(lower.panel(p), lower.panel(q), done, -1.0, lower.eight(p, done));
+            if (p == q) {
+                factor_diagonal(q);
+            } else {
+                solve_block(lower.eight(q, done), inverse_diagonal_.data() + done, lower.eight(p, done));
+            }
+        }
+    }
+}
+
+void PanelCholesky::factor_diagonal(std::size_t p) {
+    const std::size_t first = p * height;
+    double* const block = lower_->eight(p, first);
+    for (std::size_t c = 0; c < height; ++c) {
+        for (std::size_t d = 0; d < c; ++d) {
+            const double factor = block[d * height + c];
+            for (std::size_t i = c; i < height; ++i) block[c * height + i] -= factor * block[d * height + i];
+        }
+        const double diagonal = std::sqrt(block[c * height + c]);
+        inverse_diagonal_[first + c] = 1.0 / diagonal;
+        for (std::size_t i = c; i < height; ++i) block[c * height + i] *= inverse_diagonal_[first + c];
+    }
+}
+
+void PanelCholesky::solve(double* x) {
+    const PanelMatrix& lower = *lower_;
+    for (std::size_t p = 0; p < lower.panels(); ++p) {
+        const std::size_t first = p * height;
+        const double* const block = lower.eight(p, first);
+        subtract_product(lower.panel(p), first, x, x + first);
+        for (std::size_t c = 0; c < height; ++c) {
+            x[first + c] *= inverse_diagonal_[first + c];
+            for (std::size_t i = c + 1; i < height; ++i) x[first + i] -= block[c * height + i] * x[first + c];
+        }
+    }
+    pending_.assign(lower.padded_rows() * height, 0.0);
+    for (std::size_t p = lower.panels(); p-- > 0;) {
+        const std::size_t first = p * height;
+        const double* const block = lower.eight(p, first);
+        for (std::size_t c = height; c-- > 0;) {
+            const double* const sums = pending_.data() + (first + c) * height;
+            double value = x[first + c];
+            for (std::size_t lane = 0; lane < height; ++lane) value -= sums[lane];
+            for (std::size_t i = c + 1; i < height; ++i) value -= block[c * height + i] * x[first + i];
+            x[first + c] = value * inverse_diagonal_[first + c];
+        }
+        add_scaled(lower.panel(p), first, x + first, pending_.data());
+    }
+}
+
+}  // namespace thermbal
