@@ -26,16 +26,19 @@ template <typename Vector, std::size_t columns>
     for (std::size_t first = 0; first < height; first += columns) {
         std::array<std::array<Vector, vectors>, columns> sums{};
         for (std::size_t v = 0; v < depth; ++v) {
-            std::array<Vector, vectors> of_a;
-            std::memcpy(&of_a, a + v * height, sizeof of_a);
-            for (std::size_t c = 0; c < columns; ++c) {
-                for (std::size_t k = 0; k < vectors; ++k) sums[c][k] += of_a[k] * b[v * height + first + c];
+            for (std::size_t k = 0; k < vectors; ++k) {
+                Vector of_a;
+                std::memcpy(&of_a, a + v * height + k * width, sizeof of_a);
+                for (std::size_t c = 0; c < columns; ++c) sums[c][k] += of_a * b[v * height + first + c];
             }
         }
         for (std::size_t c = 0; c < columns; ++c) {
-            double* const out = block + (first + c) * height;
-            for (std::size_t lane = 0; lane < height; ++lane) {
-                out[lane] += sign * sums[c][lane / width][lane % width];
+            for (std::size_t k = 0; k < vectors; ++k) {
+                double* const out = block + (first + c) * height + k * width;
+                Vector sum;
+                std::memcpy(&sum, out, sizeof sum);
+                sum += sign * sums[c][k];
+                std::memcpy(out, &sum, sizeof sum);
             }
         }
     }
