@@ -31,13 +31,17 @@ run_one() {
     case $target in *_toml | sim_scenario) flags+=(-dict="$here/toml.dict") ;; esac
     local seeds
     seeds=$(seeds_of "$target" | tr ' ' '\n' | sort -u | while read -r folder; do [ -d "$folder" ] && echo "$folder"; done)
+    local TIMEFORMAT='%U + %S' processor_s status=0
     # shellcheck disable=SC2086  # folders without blanks, several of them
-    if "$built/fuzz_$target" "${flags[@]}" "$corpus" $seeds > "build/fuzz/$target.log" 2>&1; then
-        echo "ok   $target: $(grep -o 'number_of_executed_units: *[0-9]*' "build/fuzz/$target.log" | grep -o '[0-9]*$') inputs in $seconds s"
+    processor_s=$({ time "$built/fuzz_$target" "${flags[@]}" "$corpus" $seeds > "build/fuzz/$target.log" 2>&1; } 2>&1) || status=1
+    processor_s=$(bc <<< "$processor_s")
+    if [ $status = 0 ]; then
+        echo "ok   $target: $(grep -o 'number_of_executed_units: *[0-9]*' "build/fuzz/$target.log" | grep -o '[0-9]*$') inputs in $seconds s," \
+            "$processor_s s of processor"
     else
         echo "FAIL $target: see build/fuzz/$target.log; $(grep -o 'Test unit written to .*' "build/fuzz/$target.log" || true)"
-        return 1
     fi
+    return $status
 }
 
 # Two at a time: what is found does not depend on it.
