@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """clang-tidy on every source, or on what a change touches; two at a time.
 
     tests/tidy.py [--changed-since COMMIT] [--build build/tidy]

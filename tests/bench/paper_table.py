@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """The paper's three conditions on the simulated spindle head: paper, literal SVR, ours, truth, for T5.
 Usage: paper_table.py BIN_DIR [--seeds N]"""
 import argparse

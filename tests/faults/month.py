@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """A month in accelerated time: thermbald and thermbal-sim as they are shipped, a random mixture of all faults, the daemon killed or
 ended and started again at random moments, its wall clock set forward and back, a new test every half day. Memory, descriptors,
 WAL and database over the time, as figures and as a plot.

@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """The soak study: every fault on TCP and on RTU over a pseudo-terminal, so many times each at random moments, and a
 random mixture of all of them for so many accelerated hours. Prints a Markdown table and what it took.
 

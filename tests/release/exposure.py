@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """The exposure that systemd-analyze gives to every unit and variant here, and whether systemd understands the units.
 
     THERMBAL_BIN_DIR=build/release/bin THERMBAL_SOURCE_DIR=. tests/release/exposure.py

@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """What the linker and the compiler were told, read back from the programs: a position-independent executable, every
 relocation read-only after the start, no executable stack, no search path of the builder, stack protector, FORTIFY, control-flow
 protection; and no installed file that runs as its owner. Prints a line a program.

@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """What the hardening flags cost the SVR sweep: user CPU time of one identification with the whole sweep over n, by two builds of
 thermbalctl in turns (-DTHERMBAL_HARDENING=OFF and ON), so that what else the machine does is in both.
 

@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """Whether clients can move a scan: 10 000 malformed requests, 500 clients and a subscriber that never reads, against a daemon
 that measures. Quiet and hostile stretches of the same run take turns, so that what else the machine does is in both.
 

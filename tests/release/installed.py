@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """The packages in a clean Debian root that systemd booted: install, measure inside the sandbox, what the sandbox refuses,
 an instance, an upgrade during a running test, remove, purge.
 

@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """thermbald beside the daemons that it is held against, from the units and programs of their Debian packages (from the mirror
 that /etc/apt names; nothing is installed): exposure, what systemd knows of their state, as whom they run, compiler hardening. telegraf
 and mbusd are no packages of Debian 12. Prints the rows of a Markdown table.

@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """A socket that systemd opened: the daemon answers on it, leaves it there, and a client that connects while no daemon runs
 is answered by the next one."""
 import json

@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """What systemd hears: READY before any module answers; the watchdog is fed while the lines and the store make progress, also
 when no module answers, and is not fed while a line or the store hangs in the kernel, each by itself."""
 import os

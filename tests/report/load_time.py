@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """How long a report takes to open, and whether all of it is drawn: load_time.py REPORT.html ..."""
 import pathlib
 import sys

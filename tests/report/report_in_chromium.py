@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """The report as a person's browser shows it: nothing on the console, nothing fetched, every plot drawn with the values of
 --json (and those with the values that were stored), zoom, phone, paper, no script, and names that would like to be code."""
 import csv

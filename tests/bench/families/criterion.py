@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """Operating characteristic of the RMSE-against-n criterion: how often the clear minimum is there while the literal SVR's
 prediction is off, and how often while it is right, by window, on runs whose truth is known.
 Usage: criterion.py CORPUS --thermbalctl BIN [--every-min M] [--last-min M] [--channel T5]... [--limit-runs N] [--jobs N] [--rows FILE]

@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """Every estimator of `thermbalctl compare` on runs whose truth is known: error, wrong answers and coverage by window.
 Usage: estimators.py CORPUS --thermbalctl BIN [--estimator NAME]... [--window-min M]... [--limit-runs N] [--channel T5]...
 Windows are multiples of their greatest common divisor; the truth is that of the window's room and regime, and only live

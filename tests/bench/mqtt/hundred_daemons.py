@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """A hundred daemons' databases, a thermbal-mqtt for each, one broker that is killed (SIGKILL) and started again ten times: does
 every sample arrive, as it is stored? `hundred_daemons.py [--daemons N] [--scans N] [--every-ms MS] [--kills N]`
 
