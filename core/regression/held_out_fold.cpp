@@ -49,8 +49,10 @@ double HeldOutFold::rmse_at(double smoothing) {
 }
 
 void HeldOutFold::descend_patiently(double smoothing) {
-    for (double wide = 0.5; wide > smoothing; wide *= 0.3) {
+    double wide = 0.5;
+    while (wide > smoothing) {
         static_cast<void>(solver_.descend_to(wide, patient_steps));
+        wide *= 0.3;
     }
     static_cast<void>(solver_.descend_to(smoothing, patient_steps));
 }

@@ -79,10 +79,10 @@ class GridSearch {
         const auto least = std::ranges::min_element(*found, {}, &SigmaCandidate::rough_rmse);
         least_by_column_.push_back(least->rough_rmse);
         const bool is_least = least->rough_rmse <= std::ranges::min(least_by_column_);
-        const SigmaCandidate promising = *least;
-        if (is_least) found->erase(least);
-        std::ranges::move(*found, std::back_inserter(waiting_));
-        return is_least ? cross_validate(promising) : Result<void>{};
+        std::ranges::copy_if(*found, std::back_inserter(waiting_), [&](const SigmaCandidate& candidate) {
+            return !is_least || &candidate != &*least;
+        });
+        return is_least ? cross_validate(*least) : Result<void>{};
     }
 
     /// A kernel narrower than the data's own scale gets worse with every further step.
