@@ -169,6 +169,7 @@ Result<std::vector<ObservedChannel>> observed_channels(const SpectrumProblem& pr
 /// channel's scale is far below that of the others.
 void give_scales(std::vector<ObservedChannel>& channels, double scale_floor) {
     std::vector<double> ranges_C;
+    ranges_C.reserve(channels.size());
     for (const ObservedChannel& channel : channels) ranges_C.push_back(channel.data.range_C);
     const double common_C = scale_floor * upper_median(ranges_C);
     for (ObservedChannel& channel : channels) {
@@ -184,6 +185,7 @@ double mode_scale_C(const ObservedChannel& channel, const SpectrumOptions& optio
 /// How this test mixes the earlier tests' responses is found from all channels together.
 void mix_responses_alike(const SpectrumOptions& options, SpectrumProblem& problem) {
     std::vector<RespondingChannel> responding;
+    responding.reserve(problem.channels.size());
     for (const ObservedChannel& channel : problem.channels) {
         responding.push_back(responding_channel(channel.data, problem.basis, problem.background,
                                                 channel.responses, channel.scale_C,

@@ -49,10 +49,8 @@ double HeldOutFold::rmse_at(double smoothing) {
 }
 
 void HeldOutFold::descend_patiently(double smoothing) {
-    double wide = 0.5;
-    while (wide > smoothing) {
+    for (double wide = 0.5; wide > smoothing; wide *= 0.3) {
         static_cast<void>(solver_.descend_to(wide, patient_steps));
-        wide *= 0.3;
     }
     static_cast<void>(solver_.descend_to(smoothing, patient_steps));
 }
