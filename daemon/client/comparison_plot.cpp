@@ -44,8 +44,8 @@ PlotTable channel_table(const json& document, const json& channel, std::size_t i
         add(name + " low", error_of("steady_state_low_C"));
         add(name + " high", error_of("steady_state_high_C"));
     }
-    for (const auto& [name, sign] : {std::pair("limit below", -1.0), std::pair("limit above", 1.0)}) {
-        add(name, [sign = sign](const json& window) -> std::optional<double> {
+    for (const auto& [name, side] : {std::pair("limit below", -1.0), std::pair("limit above", 1.0)}) {
+        add(name, [sign = side](const json& window) -> std::optional<double> {
             const auto half_C = number(window, "least_half_width_C");
             return half_C ? std::optional(sign * *half_C) : std::nullopt;
         });

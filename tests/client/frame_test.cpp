@@ -46,8 +46,8 @@ TEST_F(Frame, NoFrameIsLargerThanItsScreen) {
     for (const Page page : {Page::channels, Page::channel, Page::events, Page::help}) {
         scene.page = page;
         scene.chosen = page == Page::channel ? std::optional<std::size_t>(15) : std::nullopt;
-        for (const std::size_t columns : {1, 7, 20, 40, 79, 80, 81, 97, 100, 132, 160, 250}) {
-            for (const std::size_t rows : {1, 2, 3, 10, 19, 23, 24, 25, 40, 100}) {
+        for (const std::size_t columns : {1U, 7U, 20U, 40U, 79U, 80U, 81U, 97U, 100U, 132U, 160U, 250U}) {
+            for (const std::size_t rows : {1U, 2U, 3U, 10U, 19U, 23U, 24U, 25U, 40U, 100U}) {
                 for (const FrameLook look : {FrameLook{true, true}, FrameLook{false, false}}) {
                     const auto lines = lines_of(render_frame(scene, {rows, columns}, look));
                     ASSERT_EQ(lines.size(), rows) << columns << "x" << rows;

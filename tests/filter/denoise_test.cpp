@@ -59,8 +59,8 @@ NewestError newest_error(const Plant& plant, std::size_t samples, std::size_t ne
 
 TEST(Denoise, DoesNotBendTheNewestSamples) {
     for (const Plant& plant : plants) {
-        for (const std::size_t samples : {192, 480, 1600}) {
-            for (const std::size_t newest : {1, 5, 20}) {
+        for (const std::size_t samples : {192U, 480U, 1600U}) {
+            for (const std::size_t newest : {1U, 5U, 20U}) {
                 SCOPED_TRACE(std::to_string(plant.size()) + " constants, " + std::to_string(samples) +
                              " samples, last " + std::to_string(newest));
                 const auto error = newest_error(plant, samples, newest, {});

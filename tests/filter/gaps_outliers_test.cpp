@@ -31,7 +31,7 @@ std::vector<double> measured(std::size_t samples, std::uint64_t seed, double noi
 TEST(Gaps, AreFilledCloseToTheTruth) {
     const auto truth = warm_up(400);
     auto values = measured(400, 1);
-    for (const std::size_t k : {100, 150, 151, 152, 300}) values[k] = NAN;
+    for (const std::size_t k : {100U, 150U, 151U, 152U, 300U}) values[k] = NAN;
     for (std::size_t k = 200; k < 220; ++k) values[k] = NAN;
     const auto filled = fill_short_gaps(values, {});
     ASSERT_TRUE(filled);
@@ -73,7 +73,7 @@ TEST(Gaps, LongerThanStatedAreRefused) {
 
 TEST(Gaps, AtTheEndsAreLeftOutAndNeverExtrapolated) {
     auto values = warm_up(100);
-    for (const std::size_t k : {0, 1, 97, 98, 99}) values[k] = NAN;
+    for (const std::size_t k : {0U, 1U, 97U, 98U, 99U}) values[k] = NAN;
     const auto filled = fill_short_gaps(values, {});
     ASSERT_TRUE(filled);
     EXPECT_EQ(filled->first, 2u);

@@ -39,7 +39,7 @@ std::vector<Case> cases() {
          {"db1", "db2", "db3", "db4", "db5", "db6", "db7", "db8", "sym4", "sym5", "sym6", "sym8", "coif1"}) {
         const std::size_t length = wavelet_by_name(wavelet)->length();
         for (const Boundary boundary : boundaries) {
-            for (const std::size_t samples : {31, 32, 33, 100, 191, 192, 193, 480}) {
+            for (const std::size_t samples : {31U, 32U, 33U, 100U, 191U, 192U, 193U, 480U}) {
                 const std::size_t deepest = std::min<std::size_t>(max_dwt_level(samples, length), 6);
                 for (std::size_t levels = 1; levels <= deepest; ++levels) {
                     all.push_back({wavelet, boundary, levels, noisy_warm_up(samples, random)});
@@ -90,7 +90,7 @@ TEST(Wavelet, CoefficientsAndReconstructionAreThoseOfPyWavelets) {
 
 TEST(Wavelet, ReconstructsWhatWasDecomposed) {
     std::mt19937_64 random(3);
-    for (const std::size_t samples : {9, 50, 333, 1600}) {
+    for (const std::size_t samples : {9U, 50U, 333U, 1600U}) {
         const Numbers signal = noisy_warm_up(samples, random);
         for (const Boundary boundary : {Boundary::smooth, Boundary::periodization, Boundary::antireflect}) {
             const Wavelet wavelet = *wavelet_by_name("db4");

@@ -72,7 +72,7 @@ TEST(VectorLoops, RowsAreMultipliedAndAddedUp) {
 TEST(VectorLoops, DerivativesAreThoseOfTheSmoothedLoss) {
     std::mt19937_64 random(1);
     std::normal_distribution<double> normal(0.0, 0.003);
-    for (const std::size_t count : {1, 7, 8, 9, 100}) {
+    for (const std::size_t count : {1U, 7U, 8U, 9U, 100U}) {
         Numbers residual(count), change(count);
         for (std::size_t i = 0; i < count; ++i) residual[i] = normal(random), change[i] = normal(random);
         const vector_loops::Tube tube{.C = 3.0, .epsilon = 0.001, .smoothing = 0.002};
@@ -96,10 +96,10 @@ MatrixXd kernel_of(const LagProblem& problem, double sigma) {
 
 TEST(KernelFeatures, MultiplyToTheKernel) {
     const auto window = testing::filtered_warm_up(testing::two_constants, 230, 1);
-    for (const std::size_t lags : {1, 6, 35}) {
+    for (const std::size_t lags : {1U, 6U, 35U}) {
         const auto problem = *make_lag_problem(window, lags, 0.0);
         for (const double sigma : {0.5, 4.0, 64.0}) {
-            for (const std::size_t stride : {1, 3}) {
+            for (const std::size_t stride : {1U, 3U}) {
                 const auto features = kernel_features(problem, sigma, 1e-9, stride);
                 std::vector<Index> rows;
                 for (std::size_t row = 0; row < problem.rows(); row += stride)
@@ -130,8 +130,8 @@ struct Point {
 
 std::vector<Point> points() {
     std::vector<Point> all;
-    for (const std::size_t samples : {100, 192, 480}) {
-        for (const std::size_t lags : {1, 4, 17, 35}) {
+    for (const std::size_t samples : {100U, 192U, 480U}) {
+        for (const std::size_t lags : {1U, 4U, 17U, 35U}) {
             for (const double C : {0.25, 16.0, 1024.0}) {
                 for (const double sigma : {0.5, 4.0, 32.0}) all.push_back({samples, lags, C, sigma});
             }
@@ -256,7 +256,7 @@ TEST(LowRankSweep, ChoosesAsTheWholeGridByLibsvmDoes) {
     reference.solver = SvrSolver::libsvm;
     reference.solver_tolerance = 1e-4;
     for (const auto& [name, window] : hard_windows()) {
-        for (const std::size_t lags : {1, 12}) {
+        for (const std::size_t lags : {1U, 12U}) {
             SCOPED_TRACE(name + ", n " + std::to_string(lags));
             const auto problem = *make_lag_problem(window, lags, 0.0);
             const auto chosen = search_grid(problem, ours, never_cancelled);
@@ -294,7 +294,7 @@ TEST(LowRankSweep, LeavesNoGridPointThatTheWholeGridWouldChoose) {
         const auto window =
             testing::filtered_warm_up(seed % 2 == 0 ? testing::two_constants : testing::three_constants,
                                       130 + 30 * seed, seed, 0.02 * static_cast<double>(seed + 1));
-        for (const std::size_t lags : {2, 9, 30}) {
+        for (const std::size_t lags : {2U, 9U, 30U}) {
             const auto problem = *make_lag_problem(window, lags, 0.0);
             const auto chosen = search_grid(problem, options, never_cancelled);
             const auto errors = cross_validate_grid(problem, options, never_cancelled);

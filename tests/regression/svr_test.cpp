@@ -25,9 +25,9 @@ struct Case {
 std::vector<Case> cases() {
     std::vector<Case> all;
     for (const auto* plant : {&testing::one_constant, &testing::two_constants, &testing::three_constants}) {
-        for (const std::size_t samples : {100, 192, 480}) {
+        for (const std::size_t samples : {100U, 192U, 480U}) {
             const auto window = testing::filtered_warm_up(*plant, samples, samples);
-            for (const std::size_t lags : {1, 4, 17, 35}) {
+            for (const std::size_t lags : {1U, 4U, 17U, 35U}) {
                 for (const double C : {0.25, 16.0, 256.0}) {
                     for (const double sigma : {0.5, 4.0, 32.0})
                         all.push_back({window, lags, {C, sigma, 0.001, 1e-6}});
@@ -103,8 +103,8 @@ TEST(GridSearch, ErrorsAreThoseOfGridSearchCV) {
     options.sigma_grid = {0.5, 4.0, 32.0};
     options.solver_tolerance = 1e-5;
     options.solver = SvrSolver::libsvm;
-    for (const std::size_t lags : {1, 8, 30}) {
-        for (const std::size_t samples : {97, 192}) {
+    for (const std::size_t lags : {1U, 8U, 30U}) {
+        for (const std::size_t samples : {97U, 192U}) {
             const auto window = testing::filtered_warm_up(testing::two_constants, samples, lags);
             std::string request = "grid" + testing::to_words({options.epsilon, options.solver_tolerance, 5.0,
                                                               static_cast<double>(lags)});

@@ -141,5 +141,5 @@ int main(int count, char** arguments) {
     compare_sweep(192, all_192 ? every_lag() : std::vector<std::size_t>{1, 5, 15, 25, 35});
     compare_sweep(480, {1, 5, 15, 25, 35});
     compare_sweep(1600, {5, 20, 35});
-    for (const std::size_t samples : {192, 480, 1600}) whole_sweep(samples);
+    for (const std::size_t samples : {192U, 480U, 1600U}) whole_sweep(samples);
 }
