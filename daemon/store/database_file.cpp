@@ -137,4 +137,12 @@ Result<void> put_in_place(const std::filesystem::path& database, const std::file
     return {};
 }
 
+Result<void> put_in_place_if_due(const std::filesystem::path& database, const std::filesystem::path& place) {
+    std::error_code error;
+    const bool whole = std::filesystem::file_size(database, error) > 0 && !error;
+    const bool folded_in = std::filesystem::file_size(database.string() + "-wal", error) == 0 || error;
+    if (!whole || !folded_in || std::filesystem::exists(place, error)) return {};
+    return put_in_place(database, place);
+}
+
 }  // namespace thermbal

@@ -39,4 +39,8 @@ void remove_database(const std::filesystem::path& database);
 /// Renames a closed database whose log is empty; what lay beside it is removed.
 Result<void> put_in_place(const std::filesystem::path& database, const std::filesystem::path& place);
 
+/// What put_in_place would have done had the process not ended before: `database` is whole and nothing is in
+/// `place`. Anything else is left as it is.
+Result<void> put_in_place_if_due(const std::filesystem::path& database, const std::filesystem::path& place);
+
 }  // namespace thermbal

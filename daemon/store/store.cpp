@@ -67,6 +67,11 @@ Result<std::shared_ptr<sqlite::Database>> open_writing(const std::filesystem::pa
     return database;
 }
 
+/// Where the database that is to follow a damaged one is made.
+std::filesystem::path beside(const std::filesystem::path& path) {
+    return path.string() + ".new";
+}
+
 Result<std::optional<std::filesystem::path>> clear_damage(const std::filesystem::path& path, Moment now,
                                                           const StoreOptions& options, bool all) {
     auto damaged = is_damaged(path, options.busy_timeout_ms, all);
@@ -247,6 +252,7 @@ Result<Store> Store::open(const std::filesystem::path& path, Moment now, const S
     const bool check_all = size_of(path) <= options.checked_at_once_bytes;
     auto set_aside = clear_damage(path, now, options, check_all);
     if (!set_aside) return std::unexpected(set_aside.error());
+    if (auto done = put_in_place_if_due(beside(path), path); !done) return std::unexpected(done.error());
     if (auto created = create_if_absent(path); !created) return std::unexpected(created.error());
     auto database = open_writing(path, options.busy_timeout_ms);
     if (!database) return std::unexpected(database.error());
@@ -262,22 +268,26 @@ bool Store::checked() const {
 
 Result<std::filesystem::path> Store::begin_anew(const KnownTest& known, Moment now) {
     const std::filesystem::path path = parts_->database().path();
-    const std::filesystem::path beside = path.string() + ".new";
-    remove_database(beside);
+    const std::filesystem::path fresh_path = beside(path);
+    remove_database(fresh_path);
     {
         // Beside the damaged one until it is whole: a full disk or the end of the process changes nothing.
-        auto fresh = Store::open(beside, now, {.busy_timeout_ms = parts_->busy_timeout_ms});
+        auto fresh = Store::open(fresh_path, now, {.busy_timeout_ms = parts_->busy_timeout_ms});
         if (!fresh) return std::unexpected(fresh.error());
         if (auto salvaged = salvage(read(), *fresh, known, now); !salvaged)
             return std::unexpected(salvaged.error());
     }
-    if (size_of(beside.string() + "-wal") > 0)
+    if (size_of(fresh_path.string() + "-wal") > 0)
         return fail(NextStep::retry,
-                    fmt::format("database {}: its log could not be folded in", beside.string()));
+                    fmt::format("database {}: its log could not be folded in", fresh_path.string()));
     parts_->database().leave_wal_alone_on_close();
     auto aside = put_aside(path, now);
-    if (!aside) return aside;
-    if (auto moved = put_in_place(beside, path); !moved) return std::unexpected(moved.error());
+    if (!aside) {
+        // The old one goes on: what is new now would be behind it at the next start.
+        remove_database(fresh_path);
+        return aside;
+    }
+    if (auto moved = put_in_place(fresh_path, path); !moved) return std::unexpected(moved.error());
     auto database = open_writing(path, parts_->busy_timeout_ms);
     if (!database) return std::unexpected(database.error());
     parts_->reader = Reader(std::move(*database));

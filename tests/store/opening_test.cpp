@@ -269,6 +269,51 @@ TEST_F(OpeningTest, ATestGoesOnInANewDatabaseWithWhatCanBeRead) {
     EXPECT_THAT(findings_text(*store.read().verify()), IsEmpty());
 }
 
+/// What the end of the process between the renames of begin_anew leaves: the new one is whole and not in
+/// place yet.
+class NewDatabaseTest : public OpeningTest {
+  protected:
+    std::filesystem::path fresh = path.string() + ".new";
+
+    void SetUp() override {
+        auto store = open_store(fresh);
+        const auto id = store.begin_test(test_record());
+        ASSERT_OK(store.append_scans(*id, scan_records(20)));
+    }
+
+    void expect_the_test_goes_on() const {
+        const auto store = open_store(path);
+        const auto resumed = store.resume();
+        ASSERT_OK(resumed);
+        ASSERT_TRUE(*resumed);
+        EXPECT_EQ((*resumed)->scans.size(), 20U);
+        EXPECT_FALSE(std::filesystem::exists(fresh));
+    }
+};
+
+TEST_F(NewDatabaseTest, IsInPlaceAtTheNextStart) {
+    expect_the_test_goes_on();
+}
+
+TEST_F(NewDatabaseTest, TakesThePlaceOfTheDamagedOneAtTheNextStart) {
+    std::ofstream(path) << std::string(8192, '\0');
+    expect_the_test_goes_on();
+}
+
+TEST_F(NewDatabaseTest, IsNotTakenWhileTheOldOneIsSound) {
+    std::filesystem::copy(fresh, path);
+    ASSERT_OK(open_store(path).append_scan(1, scan_record(20)));
+    EXPECT_EQ(open_store(path).read().scans(1)->size(), 21U);
+}
+
+TEST_F(NewDatabaseTest, IsNotTakenHalfMade) {
+    auto still_written = open_store(fresh);
+    ASSERT_OK(still_written.append_scan(1, scan_record(20)));
+    const auto resumed = open_store(path).resume();
+    ASSERT_OK(resumed);
+    EXPECT_FALSE(*resumed);
+}
+
 TEST_F(OpeningTest, WhereNoNewDatabaseCanBeMadeTheOldOneStays) {
     auto store = open_store(path);
     const auto id = *store.begin_test(test_record());
