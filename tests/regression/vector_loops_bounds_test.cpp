@@ -42,8 +42,8 @@ class AtTheEdge {
 };
 
 TEST(VectorLoops, ReadAndWriteNothingBeyondTheirArrays) {
-    for (const std::size_t rows : {8, 16, 24, 40, 64, 128}) {
-        for (const std::size_t count : {1, 2, 3, 4, 5, 7, 8, 13, 35, 90}) {
+    for (const std::size_t rows : {8U, 16U, 24U, 40U, 64U, 128U}) {
+        for (const std::size_t count : {1U, 2U, 3U, 4U, 5U, 7U, 8U, 13U, 35U, 90U}) {
             AtTheEdge matrix(rows * count), column(rows), weight(rows), lags(count);
             std::vector<std::ptrdiff_t> all(count);
             std::iota(all.begin(), all.end(), std::ptrdiff_t{0});

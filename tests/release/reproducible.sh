@@ -9,9 +9,10 @@ work=$(mktemp -d -t thermbal-twice-XXXXXX)
 trap 'rm -rf "$work"' EXIT
 SOURCE_DATE_EPOCH=$(dpkg-parsechangelog -l .packaging/debian/changelog -S Timestamp)
 export SOURCE_DATE_EPOCH CCACHE_DISABLE=1
+commit=$(git rev-parse HEAD)
 for folder in "$work/a" "$work/another/name"; do
     mkdir -p "$folder"
-    git archive HEAD | tar -x -C "$folder"
+    git archive "$commit" | tar -x -C "$folder"
     (
         cd "$folder"
         cmake --preset package > /dev/null
