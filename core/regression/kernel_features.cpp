@@ -68,6 +68,7 @@ KernelFeatures kernel_features(const LagProblem& problem, double sigma, double t
         const auto pivot = static_cast<std::size_t>(largest - left_over.begin());
         pivot_row.resize(rank);
         for (std::size_t k = 0; k < rank; ++k) pivot_row[k] = columns[k][pivot];
+        kernel.left_over.push_back(*largest);
         const double diagonal = std::sqrt(*largest);
         std::vector<double>& column = features.emplace_back(rows);
         vector_loops::squared_distances_to(lags.at(), rows, problem.input(pivot * stride).data(),
@@ -84,6 +85,12 @@ KernelFeatures kernel_features(const LagProblem& problem, double sigma, double t
     }
     kernel.by_row = rows_of(features);
     return kernel;
+}
+
+std::size_t KernelFeatures::rank_at(double tolerance) const {
+    const auto first_within =
+        std::ranges::find_if(left_over, [tolerance](double error) { return error <= tolerance; });
+    return static_cast<std::size_t>(first_within - left_over.begin());
 }
 
 double feature_tolerance(double sigma) {

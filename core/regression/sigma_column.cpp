@@ -34,6 +34,12 @@ double lowest_rmse(double rmse, double before, double smoothing) {
     return std::max(rmse / 4.0, without_change / (1.0 + 0.45 * std::sqrt(smoothing / rmse)));
 }
 
+/// As lowest_rmse(), where no step of smoothing has been seen yet. Measured on 4662 fits (README.md): none
+/// fell by more than 1.4 of the smoothing.
+double lowest_rmse_across_folds(double rmse) {
+    return rmse - 3.0 * across_folds_smoothing;
+}
+
 /// The first fold at the solver's C, smoothing by smoothing.
 struct RoughFit {
     double rmse = 0.0;
@@ -49,14 +55,19 @@ RoughFit fit_roughly(HeldOutFold& fold, double last_smoothing) {
 /// A candidate's errors fold by fold as they become known.
 class Race {
   public:
-    Race(const SigmaCandidate& candidate, std::size_t folds) : rmse_(folds), lowest_(folds) {
+    Race(const SigmaCandidate& candidate, const std::vector<double>& least_rmse)
+        : least_(least_rmse), rmse_(least_rmse), lowest_(least_rmse) {
         rmse_[0] = candidate.rough_rmse;
-        lowest_[0] = candidate.lowest_rmse;
+        lowest_[0] = std::max(candidate.lowest_rmse, least_[0]);
     }
 
-    void set_start(std::size_t fold, double rmse) { rmse_[fold] = rmse; }
+    void set_start(std::size_t fold, double rmse) {
+        rmse_[fold] = rmse;
+        if (fold > 0) lowest_[fold] = std::max(lowest_rmse_across_folds(rmse), least_[fold]);
+    }
     void set(std::size_t fold, double rmse, double smoothing) {
-        lowest_[fold] = smoothing == smoothings.back() ? rmse : lowest_rmse(rmse, rmse_[fold], smoothing);
+        const double lowest = lowest_rmse(rmse, rmse_[fold], smoothing);
+        lowest_[fold] = smoothing == smoothings.back() ? rmse : std::max(lowest, least_[fold]);
         rmse_[fold] = rmse;
     }
 
@@ -71,6 +82,7 @@ class Race {
         return sum / static_cast<double>(values.size());
     }
 
+    const std::vector<double>& least_;  ///< what no candidate's error is expected to fall below
     std::vector<double> rmse_;
     std::vector<double> lowest_;
 };
@@ -122,17 +134,23 @@ Result<std::vector<SigmaCandidate>> SigmaColumn::look_for_candidates(double best
 }
 
 Result<std::optional<double>> SigmaColumn::mean_mse(const SigmaCandidate& candidate, double bound,
+                                                    const std::vector<double>& least_rmse,
                                                     const Cancelled& cancelled) {
-    Race race(candidate, folds_.size());
+    Race race(candidate, least_rmse);
     if (race.is_lost(bound)) return std::nullopt;
-    for (const double smoothing : smoothings) {
+    for (std::size_t step = 0; step < smoothings.size(); ++step) {
         for (std::size_t f = 0; f < folds_.size(); ++f) {
             if (cancelled()) return sweep_cancelled();
-            if (smoothing == smoothings.front()) {
+            if (step == 0) {
                 start_fold(f, candidate);
-                if (f > 0) race.set_start(f, fold(f).rmse_at(across_folds_smoothing));
+                const double error = fold(f).rmse_at(f == 0 ? smoothings.front() : across_folds_smoothing);
+                race.set_start(f, error);
+                if (race.is_lost(bound)) return std::nullopt;
             }
-            race.set(f, fold(f).rmse_at(smoothing), smoothing);
+            // The first fold leads by one smoothing: what a step of smoothing does to it is not known before.
+            const std::size_t next = f == 0 ? step + 1 : step;
+            if (next == smoothings.size()) continue;
+            race.set(f, fold(f).rmse_at(smoothings[next]), smoothings[next]);
             if (race.is_lost(bound)) return std::nullopt;
         }
     }

@@ -40,9 +40,10 @@ class SigmaColumn {
     Result<std::vector<SigmaCandidate>> look_for_candidates(double best_mean_mse, bool skip_hopeless,
                                                             const Cancelled& cancelled);
 
-    /// The mean over folds, or nothing as soon as it is sure to be above `bound`. Error: stop when cancelled.
+    /// The mean over folds, or nothing as soon as it is sure to be above `bound`. `least_rmse`: what no error
+    /// is expected to fall below, fold by fold. Error: stop when cancelled.
     Result<std::optional<double>> mean_mse(const SigmaCandidate& candidate, double bound,
-                                           const Cancelled& cancelled);
+                                           const std::vector<double>& least_rmse, const Cancelled& cancelled);
 
     /// What is kept between calls of mean_mse(), in numbers; and lets go of it: the next call makes it again.
     std::size_t kept_numbers() const;

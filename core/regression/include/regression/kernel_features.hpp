@@ -17,7 +17,11 @@ namespace thermbal {
 struct KernelFeatures {
     Eigen::MatrixXd by_row;  ///< rank, with zeros up to a multiple of eight, x (rows / stride, rounded up)
     std::vector<std::size_t> pivots;  ///< the rows (of the problem) whose kernel functions the features span
+    std::vector<double> left_over;    ///< the largest error of a diagonal element before each pivot, falling
     std::size_t stride = 1;
+
+    /// How many of the features, the first ones, keep to a wider tolerance.
+    std::size_t rank_at(double tolerance) const;
 };
 
 /// Cholesky's factorisation with diagonal pivoting (Fine & Scheinberg 2001), until no diagonal element is off
