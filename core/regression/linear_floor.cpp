@@ -38,6 +38,7 @@ double floor_on(const LagProblem& problem, const std::vector<std::size_t>& rows)
 
 std::vector<double> linear_floor(const LagProblem& problem, const std::vector<Fold>& folds) {
     std::vector<double> floor;
+    floor.reserve(folds.size());
     for (const Fold& fold : folds) floor.push_back(floor_on(problem, fold.held_out_rows));
     return floor;
 }
