@@ -121,5 +121,43 @@ TEST(ReadUnit, AFailureLeavesNoNumberBehind) {
     }
 }
 
+ModuleProfile with_type_codes(int stride) {
+    ModuleProfile profile;
+    profile.type_code = TypeCode{.function = 3, .first_register = 40, .stride = stride, .accepted = {40, 41}};
+    return profile;
+}
+
+TEST(TypeCodes, OfEveryInputFromItsOwnRegister) {
+    CountingLink link;
+    const auto codes = read_type_codes(link, 1, with_type_codes(100));
+    ASSERT_TRUE(codes);
+    ASSERT_EQ(codes->size(), 16U);
+    for (std::size_t input = 0; input < 16; ++input) EXPECT_EQ((*codes)[input], 40 + 100 * input);
+}
+
+TEST(TypeCodes, OneForAllInputs) {
+    CountingLink link;
+    const auto codes = read_type_codes(link, 1, with_type_codes(0));
+    ASSERT_TRUE(codes);
+    EXPECT_EQ(*codes, std::vector<std::uint16_t>(16, 40));
+    ASSERT_EQ(link.calls.size(), 1U);
+    EXPECT_EQ(link.calls[0].count, 1);
+}
+
+TEST(TypeCodes, AFailureIsNoCode) {
+    CountingLink link;
+    link.fails_at = 2;
+    const auto codes = read_type_codes(link, 1, with_type_codes(100));
+    ASSERT_FALSE(codes);
+    EXPECT_EQ(codes.error().next, NextStep::reopen_link);
+}
+
+TEST(TypeCodes, AWrongOneIsNamedWithItsInput) {
+    const ModuleProfile profile = with_type_codes(1);
+    EXPECT_EQ(wrong_types(profile, std::vector<std::uint16_t>{40, 41, 40}), "");
+    EXPECT_EQ(wrong_types(profile, std::vector<std::uint16_t>{40, 7, 41, 9}),
+              "input 2 is set to type 7, input 4 is set to type 9; the profile reads type 40, 41");
+}
+
 }  // namespace
 }  // namespace thermbal

@@ -269,6 +269,47 @@ TEST_F(OpeningTest, ATestGoesOnInANewDatabaseWithWhatCanBeRead) {
     EXPECT_THAT(findings_text(*store.read().verify()), IsEmpty());
 }
 
+DeclarationRecord declaration_of(const std::string& channel, std::int64_t window_end_scan,
+                                 double steady_state_C) {
+    DeclarationRecord declaration;
+    declaration.channel = channel;
+    declaration.window_end_scan = window_end_scan;
+    declaration.declared_at_min = 62.25;
+    declaration.steady_state_C = steady_state_C;
+    return declaration;
+}
+
+TEST_F(OpeningTest, ANewDatabaseHoldsWhatWasDeclaredAndWhatWasWithdrawn) {
+    auto store = open_store(path);
+    const auto id = *store.begin_test(test_record());
+    ASSERT_OK(store.append_scans(id, scan_records(30)));
+    ASSERT_OK(store.record_declaration(id, declaration_of("T5", 10, 24.5)));
+    ASSERT_OK(store.withdraw_declaration(id, "T5", "the door was opened"));
+    ASSERT_OK(store.record_declaration(id, declaration_of("T5", 20, 25.5)));
+    ASSERT_OK(store.record_identifications(
+        id, std::array{
+                IdentificationRecord{.channel = "T7", .window_end_scan = 29, .verdict_json = "{\"n\":8}"}}));
+    ASSERT_OK(store.set_state(id, TestState::declared, start, "all settled"));
+    ASSERT_OK(store.begin_anew({.id = id,
+                                .record = test_record(),
+                                .state = TestState::declared,
+                                .reason = "all settled",
+                                .before_scan = 30},
+                               start));
+    const auto resumed = store.resume();
+    ASSERT_OK(resumed);
+    ASSERT_TRUE(*resumed);
+    EXPECT_EQ((*resumed)->test.state, TestState::declared);
+    const auto& declared = (*resumed)->declarations;
+    ASSERT_EQ(declared.size(), 2U);
+    EXPECT_EQ(declared[0].withdrawn, "the door was opened");
+    EXPECT_EQ(declared[0].steady_state_C, 24.5);
+    EXPECT_EQ(declared[1].withdrawn, "");
+    EXPECT_EQ(declared[1].steady_state_C, 25.5);
+    ASSERT_EQ((*resumed)->identifications.size(), 1U);
+    EXPECT_EQ((*resumed)->identifications[0].verdict_json, "{\"n\":8}");
+}
+
 /// What the end of the process between the renames of begin_anew leaves: the new one is whole and not in
 /// place yet.
 class NewDatabaseTest : public OpeningTest {

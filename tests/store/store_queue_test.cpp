@@ -119,6 +119,28 @@ TEST_F(StoreQueueTest, ARefusedScanHoldsUpNothingAndIsTriedAgain) {
     EXPECT_THAT(findings_text(*queue.store().read().verify()), IsEmpty());
 }
 
+TEST_F(StoreQueueTest, WhatWaitsIsWrittenBehindWhatCouldBeReadOfADamagedDatabase) {
+    for (std::int64_t scan = 0; scan <= 3; ++scan) append(scan);
+    set_write_fault(WriteFault::io_error);
+    for (std::int64_t scan = 4; scan <= 6; ++scan) append(scan);
+    const KnownTest known{.id = id, .record = test_record(), .reason = {}, .before_scan = 7};
+    EXPECT_FALSE(queue.begin_anew(known, start)) << "the disk takes no other file either";
+    EXPECT_EQ(queue.unstored_scans(), 3U);
+
+    set_write_fault(WriteFault::none);
+    EXPECT_TRUE(queue.begin_anew(known, start));
+    EXPECT_THAT(news(), ::testing::ElementsAre(StorageNews::Kind::away, StorageNews::Kind::set_aside,
+                                               StorageNews::Kind::back));
+    const auto scans = queue.store().read().scans(id);
+    ASSERT_OK(scans);
+    ASSERT_EQ(scans->size(), 7U);
+    for (const ScanRecord& scan : *scans) {
+        EXPECT_EQ(scan.status, ScanStatus::ok) << "no gap where a scan only waited";
+        EXPECT_EQ(scan.samples[4].value_C, value_C(scan.scan, 4));
+    }
+    EXPECT_EQ(queue.unstored_scans(), 0U);
+}
+
 TEST_F(StoreQueueTest, OfWhatHasAKeyOnlyTheNewestWaits) {
     set_write_fault(WriteFault::full);
     append(0);
