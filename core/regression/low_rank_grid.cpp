@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 #include <optional>
+#include <tuple>
 
 #include <Eigen/Dense>
 #include <fmt/format.h>
@@ -74,7 +75,7 @@ class GridSearch {
         for (std::size_t sigma = columns_.size(); sigma-- > 0 && !narrower_is_hopeless();) {
             if (auto looked = look_at_column(sigma); !looked) return std::unexpected(looked.error());
         }
-        std::ranges::stable_sort(waiting_, {}, &SigmaCandidate::rough_rmse);
+        sort_waiting();
         for (const SigmaCandidate& candidate : waiting_) {
             if (auto done = cross_validate(candidate); !done) return std::unexpected(done.error());
         }
@@ -101,6 +102,18 @@ class GridSearch {
         const double last = least_by_column_.back();
         return last > hopeless_rmse(best_mean_mse_, folds_.size()) &&
                last > least_by_column_[least_by_column_.size() - 2];
+    }
+
+    /// Column by column, so that none is made twice where not all can be kept; the most promising first.
+    void sort_waiting() {
+        std::vector<double> least(columns_.size(), std::numeric_limits<double>::infinity());
+        for (const SigmaCandidate& candidate : waiting_) {
+            double& of_column = least[candidate.sigma_index];
+            of_column = std::min(of_column, candidate.rough_rmse);
+        }
+        std::ranges::stable_sort(waiting_, {}, [&](const SigmaCandidate& candidate) {
+            return std::tuple(least[candidate.sigma_index], candidate.sigma_index, candidate.rough_rmse);
+        });
     }
 
     Result<void> cross_validate(const SigmaCandidate& candidate) {
