@@ -23,7 +23,7 @@ double floor_on(const LagProblem& problem, const std::vector<std::size_t>& rows)
         columns.at(unknowns, k) = problem.targets()[rows[k]];
     }
     PanelMatrix gram;
-    gram.set_zero(columns.padded_rows(), columns.padded_rows());
+    gram.set_zero_lower(columns.padded_rows());
     add_products(columns, 1.0, gram);
     const auto count = static_cast<double>(rows.size());
     for (std::size_t i = 0; i < gram.padded_rows(); ++i) {

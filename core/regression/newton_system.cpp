@@ -54,7 +54,7 @@ void gather_rows(const MatrixXd& by_row, std::span<const Index> rows, PanelMatri
 /// scale * gram - weight * mean mean' + I, the lower triangle.
 void assemble(const PanelMatrix& gram, double scale, double weight, const VectorXd& mean,
               PanelMatrix& system) {
-    system.resize(gram.padded_rows(), gram.columns());
+    system.resize_lower(gram.padded_rows());
     for (std::size_t p = 0; p < gram.panels(); ++p) {
         const double* const here = mean.data() + p * height;
         const double* const from = gram.panel(p);
@@ -95,7 +95,7 @@ const PanelMatrix& FeatureGram::over(const MatrixXd& by_row, const std::vector<I
 }
 
 void FeatureGram::start_from_nothing(std::size_t rank) {
-    sum_.set_zero(rank, rank);
+    sum_.set_zero_lower(rank);
     rows_.clear();
 }
 
@@ -104,7 +104,7 @@ void FeatureGram::start_from_all(const MatrixXd& by_row) {
     rows_.resize(static_cast<std::size_t>(by_row.cols()));
     std::iota(rows_.begin(), rows_.end(), Index{0});
     if (sum_of_all_.numbers() == 0) {
-        sum_of_all_.set_zero(rank, rank);
+        sum_of_all_.set_zero_lower(rank);
         add(by_row, rows_, 1.0, sum_of_all_);
     }
     sum_ = sum_of_all_;
@@ -122,7 +122,7 @@ const PanelMatrix& RowGram::over(const MatrixXd& by_row, const std::vector<Index
     find_kept_and_fresh(bending);
     gather_rows(by_row, bending, all_by_row_);
     if (2 * fresh_.size() > bending.size()) {
-        products_.set_zero(bending.size(), all_by_row_.padded_rows());
+        products_.set_zero_lower(bending.size());
         add_products(all_by_row_, 1.0, products_);
     } else {
         bring_up_to_date(by_row, bending);
@@ -146,7 +146,7 @@ void RowGram::find_kept_and_fresh(const std::vector<Index>& bending) {
 }
 
 void RowGram::bring_up_to_date(const MatrixXd& by_row, const std::vector<Index>& bending) {
-    new_products_.set_zero(bending.size(), all_by_row_.padded_rows());
+    new_products_.set_zero_lower(bending.size());
     for (std::size_t r = 0; r < kept_.size(); ++r) {
         for (std::size_t c = 0; c <= r; ++c) {
             new_products_.at(kept_[r].first, kept_[c].first) = products_.at(kept_[r].second, kept_[c].second);

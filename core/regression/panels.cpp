@@ -109,14 +109,34 @@ void add_scaled(const double* __restrict panel, std::size_t columns, const doubl
 
 }  // namespace
 
-void PanelMatrix::resize(std::size_t rows, std::size_t columns) {
+void PanelMatrix::make(std::size_t rows, std::size_t columns, bool is_lower) {
+    is_lower_ = is_lower;
     panels_ = (rows + height - 1) / height;
     columns_ = columns;
-    elements_.resize(padded_rows() * columns);
+    const std::size_t numbers = begin_of(panels_);
+    if (numbers > elements_.capacity()) {
+        // No more than that, and nothing copied.
+        elements_ = {};
+        elements_.reserve(numbers);
+    }
+    elements_.resize(numbers);
+}
+
+void PanelMatrix::resize(std::size_t rows, std::size_t columns) {
+    make(rows, columns, false);
+}
+
+void PanelMatrix::resize_lower(std::size_t rows) {
+    make(rows, (rows + height - 1) / height * height, true);
 }
 
 void PanelMatrix::set_zero(std::size_t rows, std::size_t columns) {
     resize(rows, columns);
+    std::ranges::fill(elements_, 0.0);
+}
+
+void PanelMatrix::set_zero_lower(std::size_t rows) {
+    resize_lower(rows);
     std::ranges::fill(elements_, 0.0);
 }
 

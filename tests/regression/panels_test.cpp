@@ -54,7 +54,12 @@ TEST(Panels, CholeskySolvesWhatEigenSolves) {
         const MatrixXd V = MatrixXd::Random(rows, rows + 5);
         const MatrixXd A = V * V.transpose() + MatrixXd::Identity(rows, rows);
         const VectorXd b = VectorXd::Random(rows);
-        PanelMatrix lower = in_panels(A);
+        PanelMatrix lower;
+        lower.set_zero_lower(static_cast<std::size_t>(rows));
+        for (Index i = 0; i < rows; ++i) {
+            for (Index j = 0; j <= i; ++j)
+                lower.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j)) = A(i, j);
+        }
         PanelCholesky cholesky;
         cholesky.factor(lower);
         VectorXd x = b;

@@ -7,23 +7,26 @@ namespace thermbal {
 
 /// A matrix cut into panels of eight rows, the last one padded with rows of zeros: the eight elements of one
 /// column of a panel lie side by side, as the vector units want them. Of a symmetric matrix only the lower
-/// triangle is kept up: what lies above it, in the panels on the diagonal too, is not defined.
+/// triangle may be kept: each panel then ends with its eight columns on the diagonal, and what lies above the
+/// diagonal in these is not defined.
 class PanelMatrix {
   public:
     static constexpr std::size_t height = 8;
 
     /// All zeros.
     void set_zero(std::size_t rows, std::size_t columns);
-    /// Elements not defined, memory kept.
+    void set_zero_lower(std::size_t rows);
+    /// Elements not defined.
     void resize(std::size_t rows, std::size_t columns);
+    void resize_lower(std::size_t rows);
 
     std::size_t panels() const { return panels_; }
     std::size_t padded_rows() const { return panels_ * height; }
     std::size_t columns() const { return columns_; }
     std::size_t numbers() const { return elements_.size(); }
 
-    double* panel(std::size_t p) { return elements_.data() + p * columns_ * height; }
-    const double* panel(std::size_t p) const { return elements_.data() + p * columns_ * height; }
+    double* panel(std::size_t p) { return elements_.data() + begin_of(p); }
+    const double* panel(std::size_t p) const { return elements_.data() + begin_of(p); }
     /// The eight elements of column j in panel p.
     double* eight(std::size_t p, std::size_t j) { return panel(p) + j * height; }
     const double* eight(std::size_t p, std::size_t j) const { return panel(p) + j * height; }
@@ -31,12 +34,18 @@ class PanelMatrix {
     double at(std::size_t i, std::size_t j) const { return eight(i / height, j)[i % height]; }
 
   private:
+    std::size_t begin_of(std::size_t p) const {
+        return is_lower_ ? p * (p + 1) / 2 * height * height : p * columns_ * height;
+    }
+    void make(std::size_t rows, std::size_t columns, bool is_lower);
+
+    bool is_lower_ = false;
     std::size_t panels_ = 0;
     std::size_t columns_ = 0;
     std::vector<double> elements_;
 };
 
-/// lower += sign * V V'. REQUIRES: lower square, of V's padded rows.
+/// lower += sign * V V', its lower triangle. REQUIRES: lower square, of V's padded rows.
 void add_products(const PanelMatrix& V, double sign, PanelMatrix& lower);
 
 /// out = V W', for V and W of equally many columns.
