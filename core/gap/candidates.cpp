@@ -16,8 +16,7 @@ std::vector<Candidate> all_candidates(const Model& model, const std::vector<std:
     std::vector<Candidate> candidates;
     for (const EffectDefinition& definition : effect_catalogue()) {
         for (const EffectForm& form : definition.forms) {
-            if (form.name == "thermostat")
-                continue;  // jumps with every parameter: derived from a square wave that was found
+            if (form.steers_itself) continue;  // screen_thermostats
             const auto places = form.site == EffectSite::column ? columns : possible_places(form, model);
             for (const std::string& at : places) {
                 if (!is_there_already(model, definition.kind, at))

@@ -28,7 +28,11 @@ struct Screened {
     Candidate candidate;
     Effect start;
     double log_likelihood_gain = 0.0;
+    std::vector<double> moments_s = {};  ///< of a thermostat: when it was seen to switch, on first
 };
+
+/// When the spindle starts, and when a column that drives a source jumps.
+std::vector<double> drive_changes_s(const Model& model, const Inputs& inputs);
 
 /// Tries the candidate with its shape (onset, period, decay ...) on a grid, its size solved for at each.
 /// `timing`: what the residual itself says of when.

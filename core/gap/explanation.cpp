@@ -12,12 +12,12 @@ namespace thermbal {
 namespace {
 
 /// The coordinates of a neighbour's fit, then the new effects' own, then the nuisances.
-Eigen::VectorXd coordinates_from(const FitProblem& problem, const Fit& neighbour) {
+Eigen::VectorXd coordinates_from(const FitProblem& problem, const Eigen::VectorXd& neighbour) {
     Eigen::VectorXd coordinates = problem.prior_coordinates();
     const Eigen::Index nuisances = problem.data().nuisances();
-    const auto known = neighbour.point.coordinates.size() - nuisances;
-    coordinates.head(known) = neighbour.point.coordinates.head(known);
-    coordinates.tail(nuisances) = neighbour.point.coordinates.tail(nuisances);
+    const auto known = neighbour.size() - nuisances;
+    coordinates.head(known) = neighbour.head(known);
+    coordinates.tail(nuisances) = neighbour.tail(nuisances);
     return coordinates;
 }
 
@@ -73,14 +73,10 @@ double log_evidence(const Fit& fit, double run_length_s) {
     return result;
 }
 
-Result<Explanation> explain(const Evidence& evidence, std::vector<Effect> effects,
-                            const Explanation* neighbour) {
-    const FitProblem problem(evidence.run, with_effects(evidence.prior_model, effects));
-    FitStart start{problem.prior_coordinates(), nullptr};
-    if (neighbour != nullptr) {
-        start.coordinates = coordinates_from(problem, neighbour->fit);
-        start.known_jacobian = &neighbour->fit.jacobian;
-    }
+namespace {
+
+Result<Explanation> explained_from(const Evidence& evidence, std::vector<Effect> effects,
+                                   const FitProblem& problem, const FitStart& start) {
     auto fit = minimise(problem, start, evidence.calibration);
     if (!fit) return std::unexpected(fit.error());
     Explanation explanation{std::move(effects), std::move(*fit), 0.0, 0.0};
@@ -89,14 +85,30 @@ Result<Explanation> explain(const Evidence& evidence, std::vector<Effect> effect
     return explanation;
 }
 
+}  // namespace
+
+Result<Explanation> explain(const Evidence& evidence, std::vector<Effect> effects,
+                            const Explanation* neighbour) {
+    const FitProblem problem(evidence.run, with_effects(evidence.prior_model, effects));
+    FitStart start{problem.prior_coordinates(), nullptr};
+    if (neighbour != nullptr) {
+        start.coordinates = coordinates_from(problem, neighbour->fit.point.coordinates);
+        start.known_jacobian = &neighbour->fit.jacobian;
+    }
+    return explained_from(evidence, std::move(effects), problem, start);
+}
+
+Result<Explanation> explain_anew(const Evidence& evidence, std::vector<Effect> effects,
+                                 const Eigen::VectorXd& coordinates) {
+    const FitProblem problem(evidence.run, with_effects(evidence.prior_model, effects));
+    const FitStart start{coordinates_from(problem, coordinates), nullptr};
+    return explained_from(evidence, std::move(effects), problem, start);
+}
+
 Result<Explanation> polish(const Evidence& evidence, const Explanation& explanation) {
     const FitProblem problem(evidence.run, with_effects(evidence.prior_model, explanation.effects));
-    auto fit = minimise(problem, {explanation.fit.point.coordinates, nullptr}, evidence.calibration);
-    if (!fit) return std::unexpected(fit.error());
-    Explanation polished{explanation.effects, std::move(*fit), 0.0, 0.0};
-    polished.log_evidence = log_evidence(polished.fit, length_s(evidence.run)) +
-                            start_consensus(evidence.run, polished.fit.model);
-    return polished;
+    return explained_from(evidence, explanation.effects, problem,
+                          {explanation.fit.point.coordinates, nullptr});
 }
 
 }  // namespace thermbal

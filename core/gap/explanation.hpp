@@ -37,6 +37,10 @@ Model with_effects(const Model& model, const std::vector<Effect>& effects);
 Result<Explanation> explain(const Evidence& evidence, std::vector<Effect> effects,
                             const Explanation* neighbour);
 
+/// Begins at these coordinates of an explanation without the last effect, and computes every sensitivity.
+Result<Explanation> explain_anew(const Evidence& evidence, std::vector<Effect> effects,
+                                 const Eigen::VectorXd& coordinates);
+
 /// The same again with every sensitivity computed at the fit.
 Result<Explanation> polish(const Evidence& evidence, const Explanation& explanation);
 

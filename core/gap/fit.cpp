@@ -109,7 +109,10 @@ Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const Cal
     double damping = 1e-3;
     Slope slope(problem, start);
     if (auto done = slope.follow(fit.point); !done) return std::unexpected(done.error());
-    while (fit.iterations < options.max_iterations && !fit.converged) {
+    // Where moments of switching move with everything, more steps go nowhere.
+    const int most_iterations =
+        problem.steers_itself() ? std::min(options.max_iterations, 15) : options.max_iterations;
+    while (fit.iterations < most_iterations && !fit.converged) {
         ++fit.iterations;
         const Eigen::VectorXd gradient = slope.jacobian().transpose() * fit.point.residual;
         bool better = false;

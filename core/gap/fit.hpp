@@ -73,6 +73,7 @@ class FitProblem {
     FitProblem(const FitData& data, Model prior_model);
 
     const std::vector<Parameter>& parameters() const { return parameters_; }
+    bool steers_itself() const { return steers_itself_; }
     const FitData& data() const { return *data_; }
     Eigen::Index dimensions() const {
         return static_cast<Eigen::Index>(parameters_.size()) + data_->nuisances();
@@ -102,6 +103,7 @@ class FitProblem {
     const FitData* data_;
     Model prior_model_;
     std::vector<Parameter> parameters_;
+    bool steers_itself_;  ///< an effect of the model does
 };
 
 /// What a fit may start from and how far it goes.

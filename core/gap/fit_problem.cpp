@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "fit.hpp"
+#include "network/effect.hpp"
 #include "network/simulate.hpp"
 
 namespace thermbal {
@@ -84,7 +85,12 @@ Result<FitData> make_fit_data(const Model& model, const RecordedTest& test,
 }
 
 FitProblem::FitProblem(const FitData& data, Model prior_model)
-    : data_(&data), prior_model_(std::move(prior_model)), parameters_(parameters_of(prior_model_)) {}
+    : data_(&data),
+      prior_model_(std::move(prior_model)),
+      parameters_(parameters_of(prior_model_)),
+      steers_itself_(std::ranges::any_of(prior_model_.effects, [](const Effect& effect) {
+          return find_effect(effect.kind)->form_of(effect).steers_itself;
+      })) {}
 
 Eigen::VectorXd FitProblem::prior_coordinates() const {
     Eigen::VectorXd coordinates = Eigen::VectorXd::Zero(dimensions());
@@ -216,9 +222,12 @@ double FitProblem::step_of(Eigen::Index coordinate, const FitPoint& point) const
                               p.to_value(point.coordinates(coordinate));
         return 0.05 / std::max(cycles, 1.0);
     }
-    if (p.logarithmic) return 0.01;
+    // A thermostat's moments of switching move much with little, and what follows repeats.
+    const double share = steers_itself_ ? 0.001 : 0.01;
+    if (p.logarithmic) return share;
+    if (p.name.ends_with("switch_on_C")) return share * data_->seen.range_C.maxCoeff();
     const double spread = std::isinf(p.prior_sigma) ? p.upper - p.lower : p.prior_sigma;
-    return 0.01 * spread;
+    return share * spread;
 }
 
 Result<Eigen::VectorXd> FitProblem::sensitivity(const FitPoint& point, Eigen::Index coordinate) const {

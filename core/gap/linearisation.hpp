@@ -22,7 +22,6 @@ class Linearisation {
     };
     /// Of adding `amplitude * change`, with every parameter free to follow.
     Gain gain_of(const Eigen::VectorXd& whitened_change) const;
-
     Eigen::Index samples() const { return samples_; }
     /// Whitened residual at the optimum of the linearised fit, without the priors.
     const Eigen::VectorXd& residual() const { return residual_; }

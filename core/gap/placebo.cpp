@@ -116,19 +116,6 @@ Eigen::MatrixXd smooth_covariance(const Hats& hat, double size, double smoothnes
     return covariance;
 }
 
-/// The same fit, its readings pooled.
-Fit with_pooled_readings(const Fit& fit) {
-    const Eigen::Index rows = fit.point.simulated_C.rows(), readings = fit.point.simulated_C.size();
-    const Eigen::Index priors = fit.jacobian.cols();
-    const Eigen::MatrixXd some = pooled(fit.jacobian.topRows(readings), rows);
-    Fit result{fit.model, fit.parameters, {}, {}, fit.iterations, fit.converged};
-    result.jacobian.resize(some.rows() + priors, priors);
-    result.jacobian << some, fit.jacobian.bottomRows(priors);
-    result.point.residual.resize(some.rows() + priors);
-    result.point.residual << pooled(fit.point.residual.head(readings), rows), fit.point.residual.tail(priors);
-    return result;
-}
-
 /// Averages the evidence over sizes and smoothnesses; keeps the course of the best.
 void weigh(Nameless& nameless, const Eigen::MatrixXd& responses, const Linearisation& linearisation,
            const Hats& hat, double typical_size) {

@@ -17,21 +17,6 @@ std::vector<double> spread_over(const Observation& seen, int count) {
     return moments_s;
 }
 
-/// When the spindle starts, and when a column that drives a source jumps.
-std::vector<double> drive_changes_s(const Model& model, const Inputs& inputs) {
-    std::vector<double> moments_s = {inputs.time_s.front()};
-    for (const Column& column : inputs.columns) {
-        if (std::ranges::find(model.sources, column.name, &Source::proportional_to) == model.sources.end())
-            continue;
-        for (std::size_t row = 1; row < column.values.size(); ++row) {
-            const double before = column.values[row - 1], after = column.values[row];
-            if (std::abs(after - before) > 0.05 * std::max(std::abs(after), std::abs(before)))
-                moments_s.push_back(inputs.time_s[row]);
-        }
-    }
-    return moments_s;
-}
-
 /// A column knows a change to within a row: what looks like a stop right beside it is that.
 void leave_out_known_changes(std::vector<double>& onsets_s, const Model& model, const Observation& seen) {
     constexpr double bins = 2.5;
@@ -182,6 +167,20 @@ class BestShape {
 };
 
 }  // namespace
+
+std::vector<double> drive_changes_s(const Model& model, const Inputs& inputs) {
+    std::vector<double> moments_s = {inputs.time_s.front()};
+    for (const Column& column : inputs.columns) {
+        if (std::ranges::find(model.sources, column.name, &Source::proportional_to) == model.sources.end())
+            continue;
+        for (std::size_t row = 1; row < column.values.size(); ++row) {
+            const double before = column.values[row - 1], after = column.values[row];
+            if (std::abs(after - before) > 0.05 * std::max(std::abs(after), std::abs(before)))
+                moments_s.push_back(inputs.time_s[row]);
+        }
+    }
+    return moments_s;
+}
 
 Screened screen(const Candidate& candidate, const ScreeningGround& ground, const ResidualTiming& timing) {
     const Observation& seen = ground.run();

@@ -5,6 +5,7 @@
 #include "explanation.hpp"
 #include "ground.hpp"
 #include "residual_timing.hpp"
+#include "thermostats.hpp"
 
 namespace thermbal {
 namespace {
@@ -17,13 +18,15 @@ constexpr std::size_t most_forecasts = 12;
 constexpr std::size_t most_polished = 4;
 constexpr double close_to_the_best = 8.0;  ///< nats; to which a fifth of the best comes
 
-std::vector<Screened> screen_all(const Evidence& evidence, const Explanation& current) {
+std::vector<Screened> screen_all(const Evidence& evidence, const Explanation& current,
+                                 const std::vector<Nameless>& nameless) {
     const ScreeningGround ground(evidence, current);
     const ResidualTiming timing = residual_timing(evidence.run, current.fit.point);
     const auto candidates = all_candidates(current.fit.model, evidence.room_columns);
     std::vector<Screened> screened(candidates.size());
     evidence.parallel_for(candidates.size(),
                           [&](std::size_t i) { screened[i] = screen(candidates[i], ground, timing); });
+    std::ranges::move(screen_thermostats(evidence, current, nameless), std::back_inserter(screened));
     std::ranges::sort(screened, std::ranges::greater{}, &Screened::log_likelihood_gain);
     return screened;
 }
@@ -45,27 +48,58 @@ std::vector<Screened> worth_refitting(const std::vector<Screened>& screened) {
     return chosen;
 }
 
+/// A thermostat's heat follows the temperature, jumps included: a neighbour's sensitivities say nothing of
+/// it.
+bool steers_itself(const Effect& effect) {
+    return find_effect(effect.kind)->form_of(effect).steers_itself;
+}
+
 /// The model with the candidate, fitted with the neighbour's sensitivities, which are good as long as the
 /// numbers stay near it; where that led nowhere, with its own.
-Result<Explanation> fitted_with(const Evidence& evidence, const Explanation& current, const Effect& start) {
+Result<Explanation> fitted_with(const Evidence& evidence, const Explanation& current,
+                                const Screened& screened) {
+    if (steers_itself(screened.start)) return explain_thermostat(evidence, current, screened);
     std::vector<Effect> effects = current.effects;
-    effects.push_back(start);
+    effects.push_back(screened.start);
     auto quick = explain(evidence, std::move(effects), &current);
     if (!quick || quick->fit.point.chi2 < current.fit.point.chi2) return quick;
     return polish(evidence, *quick);
+}
+
+/// When an effect sets in; none where it always acts.
+std::optional<double> onset_of(const Candidate& candidate, const Effect& effect) {
+    for (const EffectParameterDefinition& parameter : candidate.form->parameters) {
+        if (parameter.is_time && !parameter.when_absent) return effect.parameter(parameter.name);
+    }
+    return std::nullopt;
+}
+
+/// What sets in outside the run is only other numbers; what sets in right with a change of speed is what the
+/// model itself says too roughly of that change.
+bool sets_in_on_its_own(const Evidence& evidence, const Contender& contender) {
+    constexpr double bins = 5.0;
+    const Observation& seen = evidence.run.seen;
+    const auto onset_s = onset_of(contender.candidate, contender.explanation.fit.model.effects.back());
+    if (!onset_s) return true;
+    if (*onset_s < seen.time_s.front() || *onset_s > seen.time_s.back()) return false;
+    if (contender.candidate.form->parameters.front().is_time) return true;
+    const auto changes_s = drive_changes_s(evidence.prior_model, seen.inputs);
+    return std::ranges::none_of(
+        changes_s, [&](double change_s) { return std::abs(*onset_s - change_s) < bins * seen.bin_s; });
 }
 
 std::vector<Contender> fitted(const Evidence& evidence, const Explanation& current,
                               const std::vector<Screened>& chosen) {
     std::vector<std::optional<Explanation>> explanations(chosen.size());
     evidence.parallel_for(chosen.size(), [&](std::size_t i) {
-        auto explanation = fitted_with(evidence, current, chosen[i].start);
+        auto explanation = fitted_with(evidence, current, chosen[i]);
         if (explanation) explanations[i] = std::move(*explanation);
     });
     std::vector<Contender> contenders;
     for (std::size_t i = 0; i < chosen.size(); ++i) {
         if (explanations[i]) contenders.push_back({chosen[i].candidate, std::move(*explanations[i]), 0.0});
     }
+    std::erase_if(contenders, [&](const Contender& one) { return !sets_in_on_its_own(evidence, one); });
     return contenders;
 }
 
@@ -90,8 +124,9 @@ void weigh(const Evidence& evidence, const Explanation& current,
         for (std::size_t k = 0; i < forecasting && k < references.size(); ++k) {
             if (k == 0) explanation.log_prediction = 0.0;
             if (!references[k]) continue;
-            const auto better =
-                forecast(evidence.holdouts[k], evidence, explanation, &references[k]->sensitivity);
+            const bool known = !steers_itself(explanation.effects.back());
+            const auto better = forecast(evidence.holdouts[k], evidence, explanation,
+                                         known ? &references[k]->sensitivity : nullptr);
             if (better) explanation.log_prediction += better->log_density - references[k]->log_density;
         }
         contenders[i].log_bayes_factor =
@@ -119,13 +154,13 @@ std::size_t polish_leading(const Evidence& evidence, std::vector<Contender>& con
 
 Survey survey(const Evidence& evidence, const Explanation& current) {
     Survey result;
-    result.contenders = fitted(evidence, current, worth_refitting(screen_all(evidence, current)));
+    result.nameless = nameless_explanations(FitProblem(evidence.run, current.fit.model), current.fit);
+    result.contenders =
+        fitted(evidence, current, worth_refitting(screen_all(evidence, current, result.nameless)));
     weigh(evidence, current, {}, 0, result.contenders);
     const auto references = forecasts_of(evidence, current);
     weigh(evidence, current, references, most_forecasts, result.contenders);
     weigh(evidence, current, references, polish_leading(evidence, result.contenders), result.contenders);
-    const FitProblem problem(evidence.run, current.fit.model);
-    result.nameless = nameless_explanations(problem, current.fit);
     return result;
 }
 

@@ -34,6 +34,11 @@ std::vector<double> InputSchedule::jumps_s() const {
     return jumps;
 }
 
+std::vector<double> InputSchedule::seen_switchings_s(std::string_view node) const {
+    const auto seen = std::ranges::find(inputs_.seen_switchings, node, &Inputs::SeenSwitchings::node);
+    return seen == inputs_.seen_switchings.end() ? std::vector<double>{} : seen->moments_s;
+}
+
 double InputSchedule::at(std::size_t column, double time_s) {
     Held& held = used_[column];
     while (held.now + 1 < held.from_s.size() && held.from_s[held.now + 1] <= time_s) ++held.now;

@@ -23,6 +23,8 @@ class InputSchedule {
     std::optional<std::size_t> use(std::string_view name);
     /// The moments inside (start, end) at which a column in use jumps, unordered, may repeat.
     std::vector<double> jumps_s() const;
+    /// When a node's thermostat was seen to switch; empty when it was not.
+    std::vector<double> seen_switchings_s(std::string_view node) const;
     /// Value of a used column between two jumps. Times of consecutive calls for a column must not decrease.
     double at(std::size_t column, double time_s);
     /// Forgets how far `at` has come.

@@ -144,11 +144,12 @@ double Integrator::shorten_to_switching(double from_s, double h_s) {
     return behind;
 }
 
-void Integrator::switch_thermostats() {
+void Integrator::switch_thermostats(double time_s) {
     for (std::size_t i = 0; i < network_.thermostats.size(); ++i) {
         if (!crosses(i, node_C_)) continue;
-        heat_.switch_thermostat(i, !heat_.thermostat_on(i));
-        ++switchings_;
+        const bool on = !heat_.thermostat_on(i);
+        heat_.switch_thermostat(i, on);
+        switchings_.push_back({time_s, network_.thermostats[i].node, on});
     }
 }
 
@@ -163,7 +164,7 @@ void Integrator::accept(double from_s, double h_s) {
     }
     node_C_.swap(next_C_);
     modal_.swap(next_modal_);
-    switch_thermostats();
+    switch_thermostats(from_s + h_s);
 }
 
 Result<void> Integrator::advance(double from_s, double to_s) {
@@ -181,7 +182,7 @@ Result<void> Integrator::advance(double from_s, double to_s) {
         if (!network_.thermostats.empty()) h_s = shorten_to_switching(time_s, h_s);
         if (!(next_C_.lpNorm<Eigen::Infinity>() < runaway_C)) return run_away(time_s);
         accept(time_s, h_s);
-        if (switchings_ > most_switchings) {
+        if (switchings_.size() > most_switchings) {
             return fail(NextStep::stop, fmt::format("a thermostat switches without end at {:.0f} s", time_s));
         }
         time_s = h_s >= left_s ? to_s : time_s + h_s;
@@ -208,7 +209,7 @@ Result<void> Integrator::run(const Eigen::VectorXd& initial_C, std::span<const d
     enter_regime(regime);
     heat_.begin_step(moments.front(), moments.front());
     sensors_.begin(moments.front(), node_C_, heat_.ambient_C(moments.front()));
-    switch_thermostats();
+    switch_thermostats(moments.front());
     for (std::size_t i = 0;; ++i) {
         if (sample != sample_times_s.end() && *sample == moments[i]) {
             heat_.begin_step(moments[i], moments[i]);

@@ -34,6 +34,7 @@ class Integrator {
     Result<void> run(const Eigen::VectorXd& initial_C, std::span<const double> sample_times_s,
                      const AtSample& at_sample);
     int steps() const { return steps_; }
+    const std::vector<ThermostatSwitching>& switchings() const { return switchings_; }
 
   private:
     /// The factors of a step of h_s, per mode.
@@ -57,7 +58,7 @@ class Integrator {
     bool crosses(std::size_t thermostat, const Eigen::VectorXd& node_C) const;
     /// The largest part of the step that no thermostat's switching lies in; leaves that step in next_*.
     double shorten_to_switching(double from_s, double h_s);
-    void switch_thermostats();
+    void switch_thermostats(double time_s);
 
     const CompiledNetwork& network_;
     HeatFlow heat_;
@@ -73,7 +74,7 @@ class Integrator {
     Eigen::VectorXd node_C_, modal_, next_C_, next_modal_;
     Eigen::VectorXd heat_W_, begin_, middle_, end_, stage_C_, from_slope_, to_slope_;
     int steps_ = 0;
-    int switchings_ = 0;
+    std::vector<ThermostatSwitching> switchings_;
     int halvings_ = 0;  ///< of the present step, against the interval of the grid
 };
 

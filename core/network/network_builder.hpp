@@ -134,6 +134,10 @@ class NetworkBuilder {
     std::size_t node_of_source(std::size_t source) const { return network_.sources[source].node; }
     /// Conductances of a node's links to other nodes, by node.
     std::vector<std::pair<std::size_t, double>> links_of(std::size_t node) const;
+    /// When a node's thermostat was seen to switch, on first; empty: its temperature says.
+    std::vector<double> seen_switchings_s(std::string_view node) const {
+        return schedule_.seen_switchings_s(node);
+    }
     double start_s() const { return schedule_.start_s(); }
     double end_s() const { return schedule_.end_s(); }
 

@@ -85,6 +85,7 @@ Result<Simulation> simulate(const Model& model, const Inputs& inputs, std::span<
     };
     if (auto done = integrator.run(initial_C, sample_times_s, record); !done)
         return std::unexpected(done.error());
+    simulation.switchings = integrator.switchings();
     simulation.steps = integrator.steps();
     return simulation;
 }

@@ -40,6 +40,7 @@ json effect_to_json(const FoundEffect& found) {
         parameters[name] = number_or_null(number.value);
         intervals[name] = {number_or_null(low), number_or_null(high)};
     }
+    if (found.cycle_s) parameters["period_s"] = number_or_null(*found.cycle_s);
     json experiments = json::array();
     for (const SeparatingExperiment& one : found.experiments) {
         experiments.push_back({{"against", one.against},

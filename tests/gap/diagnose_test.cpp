@@ -56,6 +56,26 @@ TEST(Diagnose, ASensorIsNotTheMachine) {
     EXPECT_EQ(diagnosis->effects.front().at, "T2");
 }
 
+TEST(Diagnose, FindsAChillerThatAThermostatSwitches) {
+    Model truth = small_machine();
+    truth.effects.push_back({"coolant_cycling",
+                             "thermostat",
+                             "housing",
+                             {{"power_W", 80.0, 0.0}, {"switch_on_C", 25.0, 0.0}, {"hysteresis_C", 1.0, 0.0}},
+                             {}});
+    const auto diagnosis = diagnosis_of(truth);
+    ASSERT_TRUE(diagnosis.has_value()) << diagnosis.error().message;
+    ASSERT_FALSE(diagnosis->effects.empty()) << diagnosis->reason;
+    const FoundEffect& found = diagnosis->effects.front();
+    EXPECT_EQ(found.effect.kind, "coolant_cycling");
+    EXPECT_EQ(found.effect.form, "thermostat");
+    EXPECT_EQ(found.at, "housing");
+    EXPECT_NEAR(found.effect.parameter("power_W"), 80.0, 12.0);
+    EXPECT_NEAR(found.effect.parameter("switch_on_C"), 25.0, 0.2);
+    EXPECT_NEAR(found.effect.parameter("hysteresis_C"), 1.0, 0.2);
+    ASSERT_TRUE(found.cycle_s.has_value());
+}
+
 TEST(Diagnose, TheExtendedModelIsAModelAgain) {
     const auto diagnosis =
         diagnosis_of(with("cutting_heat", "bed", {{"power_W", 60.0, 0.0}, {"onset_s", 6000.0, 0.0}}));

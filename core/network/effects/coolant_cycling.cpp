@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+#include <vector>
 
 #include "network/effect.hpp"
 #include "network_builder.hpp"
@@ -30,8 +32,22 @@ void attach_square_wave(const PlacedEffect& effect, NetworkBuilder& network) {
         Variation::steps);
 }
 
+void attach_seen(const PlacedEffect& effect, std::vector<double> moments_s, NetworkBuilder& network) {
+    for (const double moment_s : moments_s) network.add_break(moment_s);
+    network.add_heat(
+        effect.at,
+        [power_W = effect.values[0], moments_s = std::move(moments_s)](const NetworkState& state) {
+            const auto switched =
+                std::ranges::upper_bound(moments_s, state.step_middle_s) - moments_s.begin();
+            return switched % 2 == 1 ? -power_W : 0.0;
+        },
+        Variation::steps);
+}
+
 void attach(const PlacedEffect& effect, NetworkBuilder& network) {
     if (effect.form == square_wave) return attach_square_wave(effect, network);
+    auto seen_s = network.seen_switchings_s(effect.at_name);
+    if (!seen_s.empty()) return attach_seen(effect, std::move(seen_s), network);
     const double on_C = effect.values[1];
     network.add_thermostat(
         {.node = effect.at, .power_W = effect.values[0], .on_C = on_C, .off_C = on_C - effect.values[2]});
@@ -91,7 +107,8 @@ EffectDefinition coolant_cycling_effect() {
                                    .upper = 20,
                                    .prior_centre = 1,
                                    .prior_sigma = 0.8,
-                                   .logarithmic = true}}}},
+                                   .logarithmic = true}},
+                   .steers_itself = true}},
         .source =
             "two-point control; hysteresis of machine tool chillers 2 K (AKZ438) to 4.4 K (Hyfra VWK21), 500 "
             "to 1100 "

@@ -18,9 +18,9 @@ namespace thermbal {
 /// place together.
 struct ModelFidelity {
     double share_of_rise =
-        0.003;  ///< standard deviation of the wander over the channel's own temperature range
+        0.002;  ///< standard deviation of the wander over the channel's own temperature range
     double correlation_s = 1200.0;
-    double place_share = 0.01;  ///< standard deviation of (rise at the sensor / rise of its node) - 1
+    double place_share = 0.006;  ///< standard deviation of (rise at the sensor / rise of its node) - 1
 };
 
 struct CalibrationOptions {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -74,6 +75,7 @@ struct FoundEffect {
     double to_s = 0.0;
     double probability = 0.0;
     std::vector<CalibratedParameter> parameters;
+    std::optional<double> cycle_s;  ///< of a thermostat: from one switching on to the next in this run, mean
     std::vector<Suspect> alternatives;
     std::vector<SeparatingExperiment> experiments;  ///< alternatives in their order, clearest first
     double rmse_before_C = 0.0;

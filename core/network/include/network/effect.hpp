@@ -60,6 +60,8 @@ struct EffectForm {
     EffectSite site = EffectSite::node;
     std::string equation;
     std::vector<EffectParameterDefinition> parameters;  ///< the first is the one that sizes the effect
+    /// When it acts follows from the temperatures: it is no multiple of one shape, and it jumps.
+    bool steers_itself = false;
 };
 
 /// An effect with everything resolved: what its physics works on. values[i] belongs to parameters[i] of the

@@ -22,6 +22,12 @@ struct Inputs {
         double value_C;
     };
     std::vector<FirstReading> first_readings;
+    /// When a thermostat was seen to switch, on first: its chiller runs then, whatever the temperatures.
+    struct SeenSwitchings {
+        std::string node;
+        std::vector<double> moments_s;
+    };
+    std::vector<SeenSwitchings> seen_switchings = {};  ///< of nodes that are not here: by their temperature
 };
 
 /// The inputs of a recorded test: all its columns, and for each channel its first good reading of the first
@@ -36,11 +42,19 @@ struct SimulationOptions {
     double tolerance_C = 1e-3;
 };
 
+/// A thermostat begins or ends to take heat away.
+struct ThermostatSwitching {
+    double time_s = 0.0;
+    std::size_t node = 0;  ///< column of Simulation::node_C
+    bool on = false;
+};
+
 struct Simulation {
-    std::vector<std::string> node_names;  ///< the model's nodes, then those that effects added
-    Eigen::MatrixXd node_C;               ///< rows: sample times; columns: node_names
-    Eigen::MatrixXd reading_C;            ///< rows: sample times; columns: the model's sensors
-    Eigen::VectorXd ambient_C;            ///< the room as the model has it, at the sample times
+    std::vector<std::string> node_names;          ///< the model's nodes, then those that effects added
+    Eigen::MatrixXd node_C;                       ///< rows: sample times; columns: node_names
+    Eigen::MatrixXd reading_C;                    ///< rows: sample times; columns: the model's sensors
+    Eigen::VectorXd ambient_C;                    ///< the room as the model has it, at the sample times
+    std::vector<ThermostatSwitching> switchings;  ///< in the order of time
     int steps = 0;
 };
 

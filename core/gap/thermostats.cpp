@@ -1,0 +1,230 @@
+#include "thermostats.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "network/simulate.hpp"
+#include "pooling.hpp"
+
+namespace thermbal {
+namespace {
+
+using Eigen::Index;
+
+constexpr double nats_that_speak_for_heat = 5.0;
+constexpr std::size_t most_nodes = 3;
+/// A chiller that is strong enough never lets its node get warmer than where it switches on.
+constexpr std::array below_the_warmest = {0.0, 0.004, 0.01, 0.02, 0.04, 0.08, 0.15};  ///< shares of the range
+constexpr std::array hysteresis_shares = {0.005, 0.012, 0.03, 0.07, 0.16, 0.35};      ///< of the range
+constexpr std::size_t on_off_on = 3;  ///< what switches on and stays on is another effect: heat that sets in
+
+/// The course of a node in a model without the chiller; empty when that cannot be simulated.
+Eigen::VectorXd node_course(const Model& model, const Observation& seen, const std::string& node) {
+    const auto simulation = simulate(model, seen.inputs, seen.time_s);
+    if (!simulation) return {};
+    return simulation->node_C.col(std::ranges::find(simulation->node_names, node) -
+                                  simulation->node_names.begin());
+}
+
+/// What the node's thermostat felt: the mean of the readings on the node, smoothed over three bins; what the
+/// model says where nothing is measured.
+Eigen::VectorXd felt_C(const Evidence& evidence, const Explanation& current, const std::string& node) {
+    const Observation& seen = evidence.run.seen;
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(seen.reading_C.rows());
+    int sensors = 0;
+    for (std::size_t c = 0; c < seen.columns(); ++c) {
+        if (current.fit.model.sensors[seen.sensors[c]].node != node) continue;
+        const auto column = static_cast<Index>(c);
+        sum += seen.reading_C.col(column).array().isFinite().select(
+            seen.reading_C.col(column), current.fit.point.simulated_C.col(column));
+        ++sensors;
+    }
+    if (sensors == 0) return node_course(current.fit.model, seen, node);
+    Eigen::VectorXd smoothed = sum / sensors;
+    for (Index row = 1; row + 1 < sum.size(); ++row) smoothed(row) = sum.segment(row - 1, 3).mean() / sensors;
+    return smoothed;
+}
+
+/// When a thermostat with these thresholds would have switched, on first.
+std::vector<double> moments_of(const Eigen::VectorXd& felt_C, const std::vector<double>& time_s, double on_C,
+                               double hysteresis_C) {
+    std::vector<double> moments_s;
+    for (Index row = 0; row < felt_C.size(); ++row) {
+        const bool runs = moments_s.size() % 2 == 1;
+        if (runs ? felt_C(row) < on_C - hysteresis_C : felt_C(row) > on_C)
+            moments_s.push_back(time_s[static_cast<std::size_t>(row)]);
+    }
+    return moments_s;
+}
+
+/// The readings' answer to heat of 1 W that sets in at the beginning: all others are it, moved and added,
+/// because the network around the fit is linear and does not change with time.
+class StepResponse {
+  public:
+    StepResponse(const FitProblem& problem, const Fit& fit, const std::string& node)
+        : time_s_(problem.data().seen.time_s) {
+        const EffectDefinition& steady = *find_effect("motor_heat");
+        const Effect heat = make_effect(steady, steady.forms.front(), node, fit.model);
+        const auto change_C = problem.reading_change_by(fit, heat);
+        if (change_C) step_C_ = *change_C / heat.parameters.front().value;
+    }
+
+    bool known() const { return step_C_.size() > 0; }
+
+    /// To 1 W taken away from every odd moment to the next.
+    Eigen::MatrixXd to_cooling(const std::vector<double>& moments_s) const {
+        Eigen::MatrixXd change_C = Eigen::MatrixXd::Zero(step_C_.rows(), step_C_.cols());
+        double sign = -1.0;
+        for (const double moment_s : moments_s) {
+            for (Index row = 0; row < change_C.rows(); ++row) {
+                const double since_s = time_s_[static_cast<std::size_t>(row)] - moment_s;
+                if (since_s > 0.0) change_C.row(row) += sign * at(since_s);
+            }
+            sign = -sign;
+        }
+        return change_C;
+    }
+
+  private:
+    Eigen::RowVectorXd at(double since_s) const {
+        const double t = time_s_.front() + since_s;
+        const auto after = std::ranges::upper_bound(time_s_, t) - time_s_.begin();
+        if (static_cast<std::size_t>(after) >= time_s_.size()) return step_C_.row(step_C_.rows() - 1);
+        const double t0 = time_s_[static_cast<std::size_t>(after) - 1];
+        const double share = (t - t0) / (time_s_[static_cast<std::size_t>(after)] - t0);
+        return (1.0 - share) * step_C_.row(after - 1) + share * step_C_.row(after);
+    }
+
+    const std::vector<double>& time_s_;
+    Eigen::MatrixXd step_C_;
+};
+
+/// Searches the thresholds of a thermostat at one node.
+class ThermostatSearch {
+  public:
+    ThermostatSearch(const Evidence& evidence, const FitProblem& problem, const Fit& fit,
+                     const Linearisation& linearisation, const Candidate& candidate)
+        : evidence_(evidence),
+          linearisation_(linearisation),
+          response_(problem, fit, candidate.at),
+          best_{candidate, make_effect(*candidate.definition, *candidate.form, candidate.at, fit.model),
+                0.0} {}
+
+    Screened over(const Eigen::VectorXd& felt_C) {
+        if (!response_.known() || felt_C.size() == 0) return best_;
+        const double warmest_C = felt_C.maxCoeff(), range_C = warmest_C - felt_C.minCoeff();
+        for (const double below : below_the_warmest) {
+            for (const double hysteresis : hysteresis_shares)
+                look_at(felt_C, warmest_C - below * range_C, hysteresis * range_C);
+        }
+        double step = 0.5;
+        for (int round = 0; round < 3 && best_.log_likelihood_gain > 0.0; ++round) {
+            const double on_C = best_.start.parameter("switch_on_C");
+            const double hysteresis_C = best_.start.parameter("hysteresis_C");
+            for (const double side : {-1.0, 1.0}) {
+                look_at(felt_C, on_C + side * step * hysteresis_C, hysteresis_C);
+                look_at(felt_C, on_C, hysteresis_C * std::exp(side * step));
+                look_at(felt_C, on_C + side * step * hysteresis_C, hysteresis_C * std::exp(side * step));
+            }
+            step *= 0.5;
+        }
+        return best_;
+    }
+
+  private:
+    void look_at(const Eigen::VectorXd& felt_C, double on_C, double hysteresis_C) {
+        const Observation& seen = evidence_.run.seen;
+        const auto moments_s = moments_of(felt_C, seen.time_s, on_C, hysteresis_C);
+        if (moments_s.size() < on_off_on) return;
+        const Eigen::VectorXd change =
+            pooled(evidence_.run.whitening(response_.to_cooling(moments_s)), static_cast<Index>(seen.rows()));
+        const auto gain = linearisation_.gain_of(change);
+        if (gain.amplitude <= 0.0 || gain.log_likelihood <= best_.log_likelihood_gain) return;
+        best_.log_likelihood_gain = gain.log_likelihood;
+        const std::array values = {gain.amplitude, on_C, hysteresis_C};
+        for (std::size_t p = 0; p < values.size(); ++p) best_.start.parameters[p].value = values[p];
+        best_.moments_s = moments_s;
+    }
+
+    const Evidence& evidence_;
+    const Linearisation& linearisation_;
+    StepResponse response_;
+    Screened best_;
+};
+
+bool is_cooled_already(const Model& model, const std::string& node) {
+    return std::ranges::any_of(model.effects, [&](const Effect& effect) {
+        return effect.kind == "coolant_cycling" && effect.at == node;
+    });
+}
+
+std::vector<std::string> nodes_that_speak_for_heat(const std::vector<Nameless>& nameless,
+                                                   const Model& model) {
+    std::vector<std::string> nodes;
+    for (const Nameless& one : nameless) {
+        if (one.log_bayes_factor < nats_that_speak_for_heat || nodes.size() == most_nodes) break;
+        if (!one.of_sensor && !is_cooled_already(model, one.at)) nodes.push_back(one.at);
+    }
+    return nodes;
+}
+
+/// Mean temperature of the node when it was switched on, and when off.
+std::array<double, 2> thresholds_C(const Eigen::VectorXd& node_C, const std::vector<double>& time_s,
+                                   const std::vector<double>& moments_s) {
+    std::array<double, 2> sum_C{}, count{};
+    for (std::size_t k = 0; k < moments_s.size(); ++k) {
+        const auto row = std::ranges::lower_bound(time_s, moments_s[k]) - time_s.begin();
+        sum_C[k % 2] += node_C(row);
+        count[k % 2] += 1.0;
+    }
+    return {sum_C[0] / count[0], sum_C[1] / count[1]};
+}
+
+}  // namespace
+
+Result<Explanation> explain_thermostat(const Evidence& evidence, const Explanation& current,
+                                       const Screened& screened) {
+    Evidence as_seen = evidence;
+    as_seen.run.seen.inputs.seen_switchings.push_back({screened.candidate.at, screened.moments_s});
+    std::vector<Effect> effects = current.effects;
+    effects.push_back(screened.start);
+    // What the numbers have done to make up for a strong chiller, a fit may not find back from.
+    auto scheduled = explain_anew(as_seen, effects, current.fit.point.coordinates);
+    auto afresh = explain(as_seen, effects, nullptr);
+    if (!scheduled || (afresh && afresh->fit.point.chi2 < scheduled->fit.point.chi2))
+        scheduled = std::move(afresh);
+    if (!scheduled) return scheduled;
+    const double power_W = scheduled->fit.model.effects.back().parameters.front().value;
+    const auto node_C = node_course(scheduled->fit.model, as_seen.run.seen, screened.candidate.at);
+    if (node_C.size() == 0) return fail(NextStep::stop, "the chiller as seen cannot be simulated");
+    const auto [on_C, off_C] = thresholds_C(node_C, as_seen.run.seen.time_s, screened.moments_s);
+    const std::array values = {power_W, on_C, std::max(on_C - off_C, 0.02)};
+    for (std::size_t p = 0; p < values.size(); ++p) effects.back().parameters[p].value = values[p];
+    const Index numbers = current.fit.point.coordinates.size() - evidence.run.nuisances();
+    Eigen::VectorXd coordinates(current.fit.point.coordinates.size());
+    coordinates << scheduled->fit.point.coordinates.head(numbers),
+        scheduled->fit.point.coordinates.tail(evidence.run.nuisances());
+    return explain_anew(evidence, std::move(effects), coordinates);
+}
+
+std::vector<Screened> screen_thermostats(const Evidence& evidence, const Explanation& current,
+                                         const std::vector<Nameless>& nameless) {
+    const std::vector<std::string> nodes = nodes_that_speak_for_heat(nameless, current.fit.model);
+    if (nodes.empty()) return {};
+    const EffectDefinition& chiller = *find_effect("coolant_cycling");
+    const FitProblem problem(evidence.run, current.fit.model);
+    const Fit fewer = with_pooled_readings(current.fit);
+    const Linearisation linearisation(fewer);
+    std::vector<Screened> screened(nodes.size());
+    evidence.parallel_for(nodes.size(), [&](std::size_t i) {
+        ThermostatSearch search(evidence, problem, current.fit, linearisation,
+                                {&chiller, chiller.form("thermostat"), nodes[i]});
+        screened[i] = search.over(felt_C(evidence, current, nodes[i]));
+    });
+    std::erase_if(screened, [](const Screened& one) { return one.log_likelihood_gain <= 0.0; });
+    std::ranges::sort(screened, std::ranges::greater{}, &Screened::log_likelihood_gain);
+    return screened;
+}
+
+}  // namespace thermbal

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <vector>
+
+#include "candidates.hpp"
+#include "explanation.hpp"
+
+namespace thermbal {
+
+/// Chillers that a thermostat switches, at the nodes where heat of an unknown course best describes the run:
+/// the numbers from which a fit may begin, best first, at most one a node. When such a chiller runs follows
+/// from the temperatures, so it is no multiple of one shape as the other candidates are. But what its
+/// thermostat felt was measured: thresholds on the readings of its node say when it ran, and so how the
+/// readings answer, its power solved for. `nameless`: best first.
+std::vector<Screened> screen_thermostats(const Evidence& evidence, const Explanation& current,
+                                         const std::vector<Nameless>& nameless);
+
+/// Fits a screened one: first as a chiller that runs when it was seen to, all numbers free; then, from there
+/// and with the temperatures at which that one switched, as a thermostat.
+Result<Explanation> explain_thermostat(const Evidence& evidence, const Explanation& current,
+                                       const Screened& screened);
+
+}  // namespace thermbal
