@@ -6,8 +6,8 @@
 #include <Eigen/Cholesky>
 
 #include "experiments.hpp"
-#include "network/simulate.hpp"
 #include "root_mean_square.hpp"
+#include "thermostats.hpp"
 
 namespace thermbal {
 namespace {
@@ -48,21 +48,6 @@ std::vector<CalibratedParameter> numbers_of(const Fit& fit, std::size_t effect) 
                            value <= parameter.lower || value >= parameter.upper});
     }
     return numbers;
-}
-
-/// How long a thermostat's cycle is in a run.
-std::optional<double> cycle_of(const Effect& effect, const Model& model, const Observation& seen) {
-    if (!find_effect(effect.kind)->form_of(effect).steers_itself) return std::nullopt;
-    const auto simulation = simulate(model, seen.inputs, seen.time_s);
-    if (!simulation) return std::nullopt;
-    const auto node = std::ranges::find(simulation->node_names, effect.at) - simulation->node_names.begin();
-    std::vector<double> ons_s;
-    for (const ThermostatSwitching& switching : simulation->switchings) {
-        if (switching.on && static_cast<std::ptrdiff_t>(switching.node) == node)
-            ons_s.push_back(switching.time_s);
-    }
-    if (ons_s.size() < 2) return std::nullopt;
-    return (ons_s.back() - ons_s.front()) / static_cast<double>(ons_s.size() - 1);
 }
 
 std::vector<std::string> channels_changed(const FitProblem& problem, const Fit& fit, const Fit& without) {

@@ -75,11 +75,13 @@ std::optional<double> onset_of(const Candidate& candidate, const Effect& effect)
 }
 
 /// What sets in outside the run is only other numbers; what sets in right with a change of speed is what the
-/// model itself says too roughly of that change.
+/// model itself says too roughly of that change. A thermostat that never switches off is heat that sets in.
 bool sets_in_on_its_own(const Evidence& evidence, const Contender& contender) {
     constexpr double bins = 5.0;
     const Observation& seen = evidence.run.seen;
-    const auto onset_s = onset_of(contender.candidate, contender.explanation.fit.model.effects.back());
+    const Model& fitted = contender.explanation.fit.model;
+    if (steers_itself(fitted.effects.back()) && !cycle_of(fitted.effects.back(), fitted, seen)) return false;
+    const auto onset_s = onset_of(contender.candidate, fitted.effects.back());
     if (!onset_s) return true;
     if (*onset_s < seen.time_s.front() || *onset_s > seen.time_s.back()) return false;
     if (contender.candidate.form->parameters.front().is_time) return true;

@@ -227,4 +227,18 @@ std::vector<Screened> screen_thermostats(const Evidence& evidence, const Explana
     return screened;
 }
 
+std::optional<double> cycle_of(const Effect& effect, const Model& model, const Observation& seen) {
+    if (!find_effect(effect.kind)->form_of(effect).steers_itself) return std::nullopt;
+    const auto simulation = simulate(model, seen.inputs, seen.time_s);
+    if (!simulation) return std::nullopt;
+    const auto node = std::ranges::find(simulation->node_names, effect.at) - simulation->node_names.begin();
+    std::vector<double> ons_s;
+    for (const ThermostatSwitching& switching : simulation->switchings) {
+        if (switching.on && static_cast<std::ptrdiff_t>(switching.node) == node)
+            ons_s.push_back(switching.time_s);
+    }
+    if (ons_s.size() < 2) return std::nullopt;
+    return (ons_s.back() - ons_s.front()) / static_cast<double>(ons_s.size() - 1);
+}
+
 }  // namespace thermbal

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "candidates.hpp"
@@ -19,5 +20,8 @@ std::vector<Screened> screen_thermostats(const Evidence& evidence, const Explana
 /// and with the temperatures at which that one switched, as a thermostat.
 Result<Explanation> explain_thermostat(const Evidence& evidence, const Explanation& current,
                                        const Screened& screened);
+
+/// How long a thermostat's cycle is in a run, mean; none for other effects, and where it does not cycle.
+std::optional<double> cycle_of(const Effect& effect, const Model& model, const Observation& seen);
 
 }  // namespace thermbal
