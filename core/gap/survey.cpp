@@ -80,7 +80,8 @@ bool sets_in_on_its_own(const Evidence& evidence, const Contender& contender) {
     constexpr double bins = 5.0;
     const Observation& seen = evidence.run.seen;
     const Model& fitted = contender.explanation.fit.model;
-    if (steers_itself(fitted.effects.back()) && !cycle_of(fitted.effects.back(), fitted, seen)) return false;
+    if (steers_itself(fitted.effects.back()) && !switches_off(fitted.effects.back(), fitted, seen))
+        return false;
     const auto onset_s = onset_of(contender.candidate, fitted.effects.back());
     if (!onset_s) return true;
     if (*onset_s < seen.time_s.front() || *onset_s > seen.time_s.back()) return false;

@@ -181,6 +181,19 @@ std::array<double, 2> thresholds_C(const Eigen::VectorXd& node_C, const std::vec
     return {sum_C[0] / count[0], sum_C[1] / count[1]};
 }
 
+/// Of the node that an effect is at.
+std::vector<ThermostatSwitching> switchings_of(const Effect& effect, const Model& model,
+                                               const Observation& seen) {
+    const auto simulation = simulate(model, seen.inputs, seen.time_s);
+    if (!simulation) return {};
+    const auto node = std::ranges::find(simulation->node_names, effect.at) - simulation->node_names.begin();
+    std::vector<ThermostatSwitching> switchings = simulation->switchings;
+    std::erase_if(switchings, [&](const ThermostatSwitching& one) {
+        return static_cast<std::ptrdiff_t>(one.node) != node;
+    });
+    return switchings;
+}
+
 }  // namespace
 
 Result<Explanation> explain_thermostat(const Evidence& evidence, const Explanation& current,
@@ -227,15 +240,16 @@ std::vector<Screened> screen_thermostats(const Evidence& evidence, const Explana
     return screened;
 }
 
+bool switches_off(const Effect& effect, const Model& model, const Observation& seen) {
+    return std::ranges::any_of(switchings_of(effect, model, seen),
+                               [](const ThermostatSwitching& one) { return !one.on; });
+}
+
 std::optional<double> cycle_of(const Effect& effect, const Model& model, const Observation& seen) {
     if (!find_effect(effect.kind)->form_of(effect).steers_itself) return std::nullopt;
-    const auto simulation = simulate(model, seen.inputs, seen.time_s);
-    if (!simulation) return std::nullopt;
-    const auto node = std::ranges::find(simulation->node_names, effect.at) - simulation->node_names.begin();
     std::vector<double> ons_s;
-    for (const ThermostatSwitching& switching : simulation->switchings) {
-        if (switching.on && static_cast<std::ptrdiff_t>(switching.node) == node)
-            ons_s.push_back(switching.time_s);
+    for (const ThermostatSwitching& one : switchings_of(effect, model, seen)) {
+        if (one.on) ons_s.push_back(one.time_s);
     }
     if (ons_s.size() < 2) return std::nullopt;
     return (ons_s.back() - ons_s.front()) / static_cast<double>(ons_s.size() - 1);

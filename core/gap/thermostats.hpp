@@ -21,6 +21,9 @@ std::vector<Screened> screen_thermostats(const Evidence& evidence, const Explana
 Result<Explanation> explain_thermostat(const Evidence& evidence, const Explanation& current,
                                        const Screened& screened);
 
+/// Whether a thermostat's chiller ever stops in a run.
+bool switches_off(const Effect& effect, const Model& model, const Observation& seen);
+
 /// How long a thermostat's cycle is in a run, mean; none for other effects, and where it does not cycle.
 std::optional<double> cycle_of(const Effect& effect, const Model& model, const Observation& seen);
 
