@@ -14,7 +14,8 @@ namespace thermbal {
 /// When a running test contradicts a model. What a test says of a channel must not flicker: it takes more to
 /// begin a disagreement than to keep it.
 struct AgreementOptions {
-    CalibrationOptions calibration;
+    /// Looked at every few minutes for days: more is allowed than in a diagnosis, which pays for every name.
+    CalibrationOptions calibration{.fidelity = {.share_of_rise = 0.003, .place_share = 0.01}};
     double least_window_s = 1200.0;  ///< a shorter test says nothing yet
     double least_bin_s = 60.0;       ///< readings are averaged over bins of this, longer in a long test
     double begins_sigmas = 4.0;      ///< of noise and fidelity, the residual smoothed over ten bins
