@@ -10,6 +10,7 @@
 #include "disagreement.hpp"
 #include "fidelity.hpp"
 #include "search.hpp"
+#include "thermostats.hpp"
 
 namespace thermbal {
 namespace {
@@ -112,7 +113,7 @@ Result<WrittenModels> as_written(const Evidence& evidence, const SearchResult& s
     auto calibrated = polish(without_places, search.base);
     if (!calibrated) return std::unexpected(calibrated.error());
     if (search.steps.empty()) return WrittenModels{calibrated->fit.model, calibrated->fit.model};
-    auto extended = polish(without_places, search.current);
+    auto extended = polish_thermostats(without_places, search.current);
     if (!extended) return std::unexpected(extended.error());
     return WrittenModels{std::move(calibrated->fit.model), std::move(extended->fit.model)};
 }

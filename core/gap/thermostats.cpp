@@ -174,7 +174,8 @@ std::array<double, 2> thresholds_C(const Eigen::VectorXd& node_C, const std::vec
                                    const std::vector<double>& moments_s) {
     std::array<double, 2> sum_C{}, count{};
     for (std::size_t k = 0; k < moments_s.size(); ++k) {
-        const auto row = std::ranges::lower_bound(time_s, moments_s[k]) - time_s.begin();
+        const auto row = std::min<Index>(std::ranges::lower_bound(time_s, moments_s[k]) - time_s.begin(),
+                                         node_C.size() - 1);
         sum_C[k % 2] += node_C(row);
         count[k % 2] += 1.0;
     }
@@ -194,31 +195,70 @@ std::vector<ThermostatSwitching> switchings_of(const Effect& effect, const Model
     return switchings;
 }
 
+/// The node's chiller runs when it was seen to.
+Evidence as_seen(Evidence evidence, const std::string& node, const std::vector<double>& moments_s) {
+    evidence.run.seen.inputs.seen_switchings.push_back({node, moments_s});
+    return evidence;
+}
+
+/// A fit whose k-th effect ran when it was seen to, as a thermostat: it switches at the temperatures that its
+/// node had then.
+Result<Explanation> set_free(const Evidence& evidence, Explanation scheduled, std::size_t k,
+                             const std::vector<double>& moments_s) {
+    const Observation& seen = evidence.run.seen;
+    const std::string& node = scheduled.effects[k].at;
+    const Evidence schedule = as_seen(evidence, node, moments_s);
+    const auto node_C = node_course(scheduled.fit.model, schedule.run.seen, node);
+    if (node_C.size() == 0) return fail(NextStep::stop, "the chiller as seen cannot be simulated");
+    const auto [on_C, off_C] = thresholds_C(node_C, seen.time_s, moments_s);
+    const std::size_t effect = evidence.prior_model.effects.size() + k;
+    const auto& parameters = scheduled.fit.parameters;
+    const auto power = std::ranges::find_if(parameters, [&](const Parameter& parameter) {
+        return parameter.of_effect && parameter.effect == effect;
+    });
+    const std::array values = {on_C, std::max(on_C - off_C, 0.02)};
+    for (std::size_t p = 0; p < values.size(); ++p) {
+        const auto number = power - parameters.begin() + 1 + static_cast<std::ptrdiff_t>(p);
+        scheduled.fit.point.coordinates(number) =
+            parameters[static_cast<std::size_t>(number)].to_coordinate(values[p]);
+    }
+    return polish(evidence, scheduled);
+}
+
 }  // namespace
 
 Result<Explanation> explain_thermostat(const Evidence& evidence, const Explanation& current,
                                        const Screened& screened) {
-    Evidence as_seen = evidence;
-    as_seen.run.seen.inputs.seen_switchings.push_back({screened.candidate.at, screened.moments_s});
+    const Evidence seen = as_seen(evidence, screened.candidate.at, screened.moments_s);
     std::vector<Effect> effects = current.effects;
     effects.push_back(screened.start);
     // What the numbers have done to make up for a strong chiller, a fit may not find back from.
-    auto scheduled = explain_anew(as_seen, effects, current.fit.point.coordinates);
-    auto afresh = explain(as_seen, effects, nullptr);
+    auto scheduled = explain_anew(seen, effects, current.fit.point.coordinates);
+    auto afresh = explain(seen, effects, nullptr);
     if (!scheduled || (afresh && afresh->fit.point.chi2 < scheduled->fit.point.chi2))
         scheduled = std::move(afresh);
     if (!scheduled) return scheduled;
-    const double power_W = scheduled->fit.model.effects.back().parameters.front().value;
-    const auto node_C = node_course(scheduled->fit.model, as_seen.run.seen, screened.candidate.at);
-    if (node_C.size() == 0) return fail(NextStep::stop, "the chiller as seen cannot be simulated");
-    const auto [on_C, off_C] = thresholds_C(node_C, as_seen.run.seen.time_s, screened.moments_s);
-    const std::array values = {power_W, on_C, std::max(on_C - off_C, 0.02)};
-    for (std::size_t p = 0; p < values.size(); ++p) effects.back().parameters[p].value = values[p];
-    const Index numbers = current.fit.point.coordinates.size() - evidence.run.nuisances();
-    Eigen::VectorXd coordinates(current.fit.point.coordinates.size());
-    coordinates << scheduled->fit.point.coordinates.head(numbers),
-        scheduled->fit.point.coordinates.tail(evidence.run.nuisances());
-    return explain_anew(evidence, std::move(effects), coordinates);
+    return set_free(evidence, std::move(*scheduled), effects.size() - 1, screened.moments_s);
+}
+
+Result<Explanation> polish_thermostats(const Evidence& evidence, const Explanation& explanation) {
+    auto best = polish(evidence, explanation);
+    const std::size_t known = evidence.prior_model.effects.size();
+    for (std::size_t k = 0; k < explanation.effects.size(); ++k) {
+        if (!find_effect(explanation.effects[k].kind)->form_of(explanation.effects[k]).steers_itself)
+            continue;
+        const Model& model = explanation.fit.model;
+        std::vector<double> moments_s;
+        for (const ThermostatSwitching& one :
+             switchings_of(model.effects[known + k], model, evidence.run.seen))
+            moments_s.push_back(one.time_s);
+        if (moments_s.size() < on_off_on) continue;
+        auto scheduled = polish(as_seen(evidence, explanation.effects[k].at, moments_s), explanation);
+        if (!scheduled) continue;
+        auto freed = set_free(evidence, std::move(*scheduled), k, moments_s);
+        if (freed && (!best || freed->fit.point.chi2 < best->fit.point.chi2)) best = std::move(freed);
+    }
+    return best;
 }
 
 std::vector<Screened> screen_thermostats(const Evidence& evidence, const Explanation& current,

@@ -21,6 +21,10 @@ std::vector<Screened> screen_thermostats(const Evidence& evidence, const Explana
 Result<Explanation> explain_thermostat(const Evidence& evidence, const Explanation& current,
                                        const Screened& screened);
 
+/// As polish; where it has thermostats, each also by way of a chiller that runs when this explanation's does,
+/// so that other nuisances do not lose its moments. The better fit of these.
+Result<Explanation> polish_thermostats(const Evidence& evidence, const Explanation& explanation);
+
 /// Whether a thermostat's chiller ever stops in a run.
 bool switches_off(const Effect& effect, const Model& model, const Observation& seen);
 
