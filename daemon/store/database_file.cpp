@@ -7,6 +7,7 @@
 #include <ctime>
 #include <fstream>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -23,6 +24,10 @@ namespace thermbal {
 
 namespace {
 
+std::filesystem::path folder_of(const std::filesystem::path& file) {
+    return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+}
+
 std::string holder(int fd) {
     std::array<char, 32> text{};
     const auto length = pread(fd, text.data(), text.size() - 1, 0);
@@ -32,7 +37,7 @@ std::string holder(int fd) {
 }
 
 void sync_folder(const std::filesystem::path& file) {
-    const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+    const auto folder = folder_of(file);
     const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (fd < 0) return;
     fsync(fd);
@@ -102,12 +107,10 @@ Result<bool> is_damaged(const std::filesystem::path& database, int busy_timeout_
     return !sound;
 }
 
-Result<std::filesystem::path> put_aside(const std::filesystem::path& database, Moment now) {
-    const auto seconds = static_cast<std::time_t>(now.wall_ns / 1'000'000'000);
-    const auto stem = fmt::format("{}.damaged-{:%Y%m%dT%H%M%SZ}", database.string(), fmt::gmtime(seconds));
-    std::string target = stem;
-    for (int i = 2; std::filesystem::exists(target); ++i) target = fmt::format("{}-{}", stem, i);
-    // The database last: as long as it is in place, the next start finds the damage again.
+namespace {
+
+/// The database last: as long as it is in place, the next start sees that it has to follow its log.
+Result<void> rename_with_log(const std::filesystem::path& database, const std::string& target) {
     for (const char* suffix : {"-wal", "-shm", ""}) {
         std::error_code error;
         std::filesystem::rename(database.string() + suffix, target + suffix, error);
@@ -117,7 +120,31 @@ Result<std::filesystem::path> put_aside(const std::filesystem::path& database, M
                                     database.string() + suffix, target + suffix, error.message()));
     }
     sync_folder(database);
+    return {};
+}
+
+}  // namespace
+
+Result<std::filesystem::path> put_aside(const std::filesystem::path& database, Moment now) {
+    const auto seconds = static_cast<std::time_t>(now.wall_ns / 1'000'000'000);
+    const auto stem = fmt::format("{}.damaged-{:%Y%m%dT%H%M%SZ}", database.string(), fmt::gmtime(seconds));
+    std::string target = stem;
+    for (int i = 2; std::filesystem::exists(target); ++i) target = fmt::format("{}-{}", stem, i);
+    if (auto done = rename_with_log(database, target); !done) return std::unexpected(done.error());
     return std::filesystem::path(target);
+}
+
+Result<void> finish_put_aside(const std::filesystem::path& database) {
+    const std::string begins = database.filename().string() + ".damaged-";
+    constexpr std::string_view log = "-wal";
+    std::error_code error;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_of(database), error)) {
+        std::string target = entry.path().string();
+        if (!entry.path().filename().string().starts_with(begins) || !target.ends_with(log)) continue;
+        target.resize(target.size() - log.size());
+        if (!std::filesystem::exists(target)) return rename_with_log(database, target);
+    }
+    return {};
 }
 
 void remove_database(const std::filesystem::path& database) {

@@ -33,6 +33,10 @@ Result<bool> is_damaged(const std::filesystem::path& database, int busy_timeout_
 /// Renames a database with its -wal and -shm to <name>.damaged-<time>; returns the new name.
 Result<std::filesystem::path> put_aside(const std::filesystem::path& database, Moment now);
 
+/// What put_aside would have done had the process not ended between its renames: where a log was set aside
+/// without its database, the database follows. Errors (stop) as put_aside.
+Result<void> finish_put_aside(const std::filesystem::path& database);
+
 /// Removes a database that nobody needs, with all that lies beside it.
 void remove_database(const std::filesystem::path& database);
 

@@ -249,6 +249,7 @@ Store::~Store() {
 Result<Store> Store::open(const std::filesystem::path& path, Moment now, const StoreOptions& options) {
     auto lock = WriterLock::take(path);
     if (!lock) return std::unexpected(lock.error());
+    if (auto done = finish_put_aside(path); !done) return std::unexpected(done.error());
     const bool check_all = size_of(path) <= options.checked_at_once_bytes;
     auto set_aside = clear_damage(path, now, options, check_all);
     if (!set_aside) return std::unexpected(set_aside.error());

@@ -341,6 +341,20 @@ TEST_F(NewDatabaseTest, TakesThePlaceOfTheDamagedOneAtTheNextStart) {
     expect_the_test_goes_on();
 }
 
+TEST_F(NewDatabaseTest, TakesThePlaceOfOneWhoseLogIsSetAsideAlready) {
+    const std::string aside = path.string() + ".damaged-20260101T000000Z";
+    const std::filesystem::path elsewhere = path.string() + ".old";
+    {
+        auto old = open_store(elsewhere);
+        const auto id = old.begin_test(test_record());
+        ASSERT_OK(old.append_scans(*id, scan_records(5)));
+    }
+    std::filesystem::rename(elsewhere, path);
+    std::ofstream(aside + "-wal") << "the last scans";
+    expect_the_test_goes_on();
+    EXPECT_TRUE(std::filesystem::exists(aside)) << "the old one follows its log";
+}
+
 TEST_F(NewDatabaseTest, IsNotTakenWhileTheOldOneIsSound) {
     std::filesystem::copy(fresh, path);
     ASSERT_OK(open_store(path).append_scan(1, scan_record(20)));
