@@ -10,7 +10,50 @@ namespace {
 /// Below this a held-out run is as good as before.
 constexpr double much_worse = 1.05;
 
+/// Nats of a run's own readings below which it is as good as before; of the held-out runs, where numbers that
+/// the run did not tell say more. Of 83 effect-free cases 4 have a name without this, 1 with it; of 147 with
+/// an effect named right 3 lose it.
+constexpr double least_of_the_run = 20.0, least_of_holdouts = 40.0;
+
+double log_likelihood_gained(const RunComparison& run) {
+    double gained = 0.0;
+    for (Eigen::Index c = 0; c < run.channel_before_rmse_C.size(); ++c) {
+        const auto readings = static_cast<double>(run.measured_C.col(c).array().isFinite().count());
+        if (readings == 0.0) continue;
+        gained += readings * std::log(run.channel_before_rmse_C(c) / run.channel_after_rmse_C(c));
+    }
+    return gained;
+}
+
+void forget_effects(RunComparison& run) {
+    run.after_C = run.before_C;
+    run.after_rmse_C = run.before_rmse_C;
+    run.channel_after_rmse_C = run.channel_before_rmse_C;
+}
+
 }  // namespace
+
+void withdraw_what_closes_no_gap(Diagnosis& diagnosis) {
+    double of_holdouts = 0.0;
+    for (const RunComparison& held : diagnosis.holdouts) of_holdouts += log_likelihood_gained(held);
+    const double of_the_run = log_likelihood_gained(diagnosis.run);
+    if (diagnosis.effects.empty() || of_the_run >= least_of_the_run || of_holdouts >= least_of_holdouts)
+        return;
+    std::vector<Suspect> withdrawn;
+    for (const FoundEffect& found : diagnosis.effects)
+        withdrawn.push_back({found.effect.kind, found.at, found.probability, 0.0});
+    diagnosis.suspects.insert(diagnosis.suspects.begin(), withdrawn.begin(), withdrawn.end());
+    diagnosis.effects.clear();
+    diagnosis.disagreements.clear();
+    diagnosis.residual_heat.clear();
+    diagnosis.extended = diagnosis.calibrated;
+    diagnosis.verdict = GapVerdict::agrees;
+    diagnosis.reason =
+        fmt::format("{} would explain something, but no run is described better with it: see the candidates",
+                    withdrawn.front().kind);
+    forget_effects(diagnosis.run);
+    for (RunComparison& held : diagnosis.holdouts) forget_effects(held);
+}
 
 void doubt_what_does_not_carry_over(Diagnosis& diagnosis) {
     double before = 0.0;

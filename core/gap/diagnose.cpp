@@ -169,6 +169,7 @@ Result<Diagnosis> diagnose(const Model& model, const RecordedTest& test, std::sp
     }
     if (auto done = compare_runs(*evidence, test, holdouts, options, diagnosis); !done)
         return std::unexpected(done.error());
+    withdraw_what_closes_no_gap(diagnosis);
     doubt_what_does_not_carry_over(diagnosis);
     return diagnosis;
 }

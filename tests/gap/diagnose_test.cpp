@@ -132,5 +132,37 @@ TEST(Diagnose, ANameThatMakesAHeldOutRunWorseIsDoubtful) {
     EXPECT_EQ(better.verdict, GapVerdict::explained);
 }
 
+RunComparison compared(double before_C, double after_C) {
+    RunComparison run;
+    run.channels = {"T2"};
+    run.measured_C = Eigen::MatrixXd::Constant(1000, 1, 20.0);
+    run.before_rmse_C = before_C;
+    run.after_rmse_C = after_C;
+    run.channel_before_rmse_C = Eigen::VectorXd::Constant(1, before_C);
+    run.channel_after_rmse_C = Eigen::VectorXd::Constant(1, after_C);
+    return run;
+}
+
+Diagnosis withdrawn_if_useless(double after_C, double held_after_C) {
+    Diagnosis diagnosis;
+    diagnosis.verdict = GapVerdict::explained;
+    diagnosis.effects.emplace_back().effect.kind = "sensor_lag";
+    diagnosis.run = compared(0.05, after_C);
+    diagnosis.holdouts = {compared(0.05, held_after_C)};
+    withdraw_what_closes_no_gap(diagnosis);
+    return diagnosis;
+}
+
+TEST(Diagnose, AnEffectIsNotNamedToFillAGapThatItDoesNotClose) {
+    const Diagnosis useless = withdrawn_if_useless(0.0495, 0.051);
+    EXPECT_TRUE(useless.effects.empty());
+    EXPECT_EQ(useless.verdict, GapVerdict::agrees);
+    ASSERT_EQ(useless.suspects.size(), 1U);
+    EXPECT_EQ(useless.suspects.front().kind, "sensor_lag");
+    EXPECT_EQ(useless.run.after_rmse_C, 0.05);
+    EXPECT_EQ(withdrawn_if_useless(0.045, 0.06).effects.size(), 1U) << "the run is described better";
+    EXPECT_EQ(withdrawn_if_useless(0.05, 0.045).effects.size(), 1U) << "the held-out run is";
+}
+
 }  // namespace
 }  // namespace thermbal
