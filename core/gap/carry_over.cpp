@@ -49,7 +49,7 @@ void withdraw_what_closes_no_gap(Diagnosis& diagnosis) {
     diagnosis.extended = diagnosis.calibrated;
     diagnosis.verdict = GapVerdict::agrees;
     diagnosis.reason =
-        fmt::format("{} would explain something, but no run is described better with it: see the candidates",
+        fmt::format("{} would explain something, but no run is described better with it: see the suspects",
                     withdrawn.front().kind);
     forget_effects(diagnosis.run);
     for (RunComparison& held : diagnosis.holdouts) forget_effects(held);

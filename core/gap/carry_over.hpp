@@ -5,7 +5,7 @@
 namespace thermbal {
 
 /// An effect is not named to fill a gap that it does not close: where neither the run nor the held-out runs
-/// are described better by a likelihood of independent readings, the names become candidates, the extended
+/// are described better by a likelihood of independent readings, the names become suspects, the extended
 /// model the calibrated one, and the verdict `agrees`. Call it when the runs have been compared.
 void withdraw_what_closes_no_gap(Diagnosis& diagnosis);
 
