@@ -16,7 +16,7 @@ namespace {
 constexpr double relative_low = 0.25, relative_high = 0.40;
 
 std::string place_of(const Effect& effect, const Model& model) {
-    const EffectSite site = find_effect(effect.kind)->form_of(effect).site;
+    const EffectSite site = form_of(effect).site;
     if (site == EffectSite::whole_model || site == EffectSite::column)
         return effect.kind == "spindle_stop" ? "all" : "ambient";
     if (site == EffectSite::source) return model.sources[*find_source(model, effect.at)].node;
@@ -25,11 +25,8 @@ std::string place_of(const Effect& effect, const Model& model) {
 
 /// From the onset that the effect has, for as long as it says; else the whole test.
 std::pair<double, double> window_of(const Effect& effect, const Observation& seen) {
-    double from_s = seen.time_s.front(), to_s = seen.time_s.back();
-    for (const EffectParameterDefinition& definition : find_effect(effect.kind)->form_of(effect).parameters) {
-        const double value = effect.parameter(definition.name);
-        if (definition.is_time && !definition.when_absent && std::isfinite(value)) from_s = value;
-    }
+    const double from_s = onset_of(effect).value_or(seen.time_s.front());
+    double to_s = seen.time_s.back();
     const double duration_s = effect.parameter("duration_s");
     if (std::isfinite(duration_s)) to_s = std::min(to_s, from_s + duration_s);
     return {from_s, to_s};

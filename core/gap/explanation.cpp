@@ -50,6 +50,16 @@ double length_s(const FitData& data) {
     return data.seen.time_s.back() - data.seen.time_s.front();
 }
 
+Result<Explanation> explained_from(const Evidence& evidence, std::vector<Effect> effects,
+                                   const FitProblem& problem, const FitStart& start) {
+    auto fit = minimise(problem, start, evidence.calibration);
+    if (!fit) return std::unexpected(fit.error());
+    Explanation explanation{std::move(effects), std::move(*fit), 0.0, 0.0};
+    explanation.log_evidence = log_evidence(explanation.fit, length_s(evidence.run)) +
+                               start_consensus(evidence.run, explanation.fit.model);
+    return explanation;
+}
+
 }  // namespace
 
 Model with_effects(const Model& model, const std::vector<Effect>& effects) {
@@ -72,20 +82,6 @@ double log_evidence(const Fit& fit, double run_length_s) {
     }
     return result;
 }
-
-namespace {
-
-Result<Explanation> explained_from(const Evidence& evidence, std::vector<Effect> effects,
-                                   const FitProblem& problem, const FitStart& start) {
-    auto fit = minimise(problem, start, evidence.calibration);
-    if (!fit) return std::unexpected(fit.error());
-    Explanation explanation{std::move(effects), std::move(*fit), 0.0, 0.0};
-    explanation.log_evidence = log_evidence(explanation.fit, length_s(evidence.run)) +
-                               start_consensus(evidence.run, explanation.fit.model);
-    return explanation;
-}
-
-}  // namespace
 
 Result<Explanation> explain(const Evidence& evidence, std::vector<Effect> effects,
                             const Explanation* neighbour) {

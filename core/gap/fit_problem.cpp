@@ -88,9 +88,8 @@ FitProblem::FitProblem(const FitData& data, Model prior_model)
     : data_(&data),
       prior_model_(std::move(prior_model)),
       parameters_(parameters_of(prior_model_)),
-      steers_itself_(std::ranges::any_of(prior_model_.effects, [](const Effect& effect) {
-          return find_effect(effect.kind)->form_of(effect).steers_itself;
-      })) {}
+      steers_itself_(std::ranges::any_of(
+          prior_model_.effects, [](const Effect& effect) { return form_of(effect).steers_itself; })) {}
 
 Eigen::VectorXd FitProblem::prior_coordinates() const {
     Eigen::VectorXd coordinates = Eigen::VectorXd::Zero(dimensions());

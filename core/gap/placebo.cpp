@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "heat_response.hpp"
 #include "network/effect.hpp"
 #include "pooling.hpp"
 
@@ -26,48 +27,15 @@ Hats hats_over(const Observation& seen) {
     return result;
 }
 
-/// The twice integrated impulse response of the readings to heat in a node: differences of it are the
-/// responses to hats, because the network around the fit is linear and does not change with time.
-class RampResponse {
-  public:
-    RampResponse(const Observation& seen, const Eigen::MatrixXd& step_response)
-        : time_s_(seen.time_s), integral_(Eigen::MatrixXd::Zero(step_response.rows(), step_response.cols())) {
-        for (Eigen::Index row = 1; row < integral_.rows(); ++row) {
-            const auto k = static_cast<std::size_t>(row);
-            integral_.row(row) =
-                integral_.row(row - 1) +
-                0.5 * (time_s_[k] - time_s_[k - 1]) * (step_response.row(row) + step_response.row(row - 1));
-        }
-    }
-
-    /// All channels, `since_s` after the ramp began.
-    Eigen::RowVectorXd at(double since_s) const {
-        const double t = time_s_.front() + since_s;
-        if (since_s <= 0.0) return Eigen::RowVectorXd::Zero(integral_.cols());
-        const auto after = std::ranges::upper_bound(time_s_, t) - time_s_.begin();
-        if (static_cast<std::size_t>(after) >= time_s_.size()) return integral_.row(integral_.rows() - 1);
-        const double t0 = time_s_[static_cast<std::size_t>(after) - 1],
-                     t1 = time_s_[static_cast<std::size_t>(after)];
-        const double share = (t - t0) / (t1 - t0);
-        return (1.0 - share) * integral_.row(after - 1) + share * integral_.row(after);
-    }
-
-  private:
-    const std::vector<double>& time_s_;
-    Eigen::MatrixXd integral_;
-};
-
 /// Whitened responses of the readings to every hat of heat in a node; empty when the node cannot be
 /// simulated.
 Eigen::MatrixXd heat_responses(const std::string& node, const FitProblem& problem, const Fit& fit,
                                const Hats& hat) {
     const FitData& data = problem.data();
-    const EffectDefinition& steady = *find_effect("motor_heat");
-    Effect heat = make_effect(steady, steady.forms.front(), node, fit.model);
-    const double power_W = heat.parameters.front().value;
-    const auto step_C = problem.reading_change_by(fit, heat);
-    if (!step_C) return {};
-    const RampResponse ramp(data.seen, *step_C / power_W);
+    const auto step = answer_to_heat(problem, fit, node);
+    if (!step) return {};
+    // Differences of the answer to a ramp are the answers to hats.
+    const CourseOfReadings ramp = step->integrated();
     Eigen::MatrixXd responses(data.seen.reading_C.size(), hats);
     Eigen::MatrixXd one(data.seen.reading_C.rows(), data.seen.reading_C.cols());
     const double begin_s = data.seen.time_s.front(), h = hat.half_width_s;

@@ -33,13 +33,8 @@ Support support_of(const Survey& survey, const Odds& odds) {
 /// everywhere.
 std::string node_of(const Effect& effect, const Model& model) {
     const auto sensor = find_sensor(model, effect.at);
-    const bool of_channel = find_effect(effect.kind)->form_of(effect).site == EffectSite::channel;
+    const bool of_channel = form_of(effect).site == EffectSite::channel;
     return of_channel && sensor ? model.sensors[*sensor].node : effect.at;
-}
-
-double onset_of(const Effect& effect) {
-    const double onset_s = effect.parameter("onset_s");
-    return std::isfinite(onset_s) ? onset_s : effect.parameter("from_s");
 }
 
 /// Two names at one node, or two that set in at the same moment, are one cause that the catalogue does not
@@ -47,8 +42,9 @@ double onset_of(const Effect& effect) {
 bool is_dressing_up(const Effect& one, const Effect& other, const Model& model) {
     constexpr double same_moment_s = 600.0;
     const std::string node = node_of(one, model);
+    const auto from_s = onset_of(one), other_from_s = onset_of(other);
     return (!node.empty() && node == node_of(other, model)) ||
-           std::abs(onset_of(one) - onset_of(other)) < same_moment_s;
+           (from_s && other_from_s && std::abs(*from_s - *other_from_s) < same_moment_s);
 }
 
 void doubt_what_is_dressed_up(SearchResult& search) {

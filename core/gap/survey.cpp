@@ -48,30 +48,16 @@ std::vector<Screened> worth_refitting(const std::vector<Screened>& screened) {
     return chosen;
 }
 
-/// A thermostat's heat follows the temperature, jumps included: a neighbour's sensitivities say nothing of
-/// it.
-bool steers_itself(const Effect& effect) {
-    return find_effect(effect.kind)->form_of(effect).steers_itself;
-}
-
 /// The model with the candidate, fitted with the neighbour's sensitivities, which are good as long as the
 /// numbers stay near it; where that led nowhere, with its own.
 Result<Explanation> fitted_with(const Evidence& evidence, const Explanation& current,
                                 const Screened& screened) {
-    if (steers_itself(screened.start)) return explain_thermostat(evidence, current, screened);
+    if (form_of(screened.start).steers_itself) return explain_thermostat(evidence, current, screened);
     std::vector<Effect> effects = current.effects;
     effects.push_back(screened.start);
     auto quick = explain(evidence, std::move(effects), &current);
     if (!quick || quick->fit.point.chi2 < current.fit.point.chi2) return quick;
     return polish(evidence, *quick);
-}
-
-/// When an effect sets in; none where it always acts.
-std::optional<double> onset_of(const Candidate& candidate, const Effect& effect) {
-    for (const EffectParameterDefinition& parameter : candidate.form->parameters) {
-        if (parameter.is_time && !parameter.when_absent) return effect.parameter(parameter.name);
-    }
-    return std::nullopt;
 }
 
 /// What sets in outside the run is only other numbers; what sets in right with a change of speed is what the
@@ -80,9 +66,9 @@ bool sets_in_on_its_own(const Evidence& evidence, const Contender& contender) {
     constexpr double bins = 5.0;
     const Observation& seen = evidence.run.seen;
     const Model& fitted = contender.explanation.fit.model;
-    if (steers_itself(fitted.effects.back()) && !switches_off(fitted.effects.back(), fitted, seen))
-        return false;
-    const auto onset_s = onset_of(contender.candidate, fitted.effects.back());
+    const Effect& effect = fitted.effects.back();
+    if (form_of(effect).steers_itself && !switches_off(effect, fitted, seen)) return false;
+    const auto onset_s = onset_of(effect);
     if (!onset_s) return true;
     if (*onset_s < seen.time_s.front() || *onset_s > seen.time_s.back()) return false;
     if (contender.candidate.form->parameters.front().is_time) return true;
@@ -127,9 +113,11 @@ void weigh(const Evidence& evidence, const Explanation& current,
         for (std::size_t k = 0; i < forecasting && k < references.size(); ++k) {
             if (k == 0) explanation.log_prediction = 0.0;
             if (!references[k]) continue;
-            const bool known = !steers_itself(explanation.effects.back());
+            // A thermostat's heat follows the temperature, jumps included: a neighbour's sensitivities say
+            // nothing of it.
+            const bool anew = form_of(explanation.effects.back()).steers_itself;
             const auto better = forecast(evidence.holdouts[k], evidence, explanation,
-                                         known ? &references[k]->sensitivity : nullptr);
+                                         anew ? nullptr : &references[k]->sensitivity);
             if (better) explanation.log_prediction += better->log_density - references[k]->log_density;
         }
         contenders[i].log_bayes_factor =

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "heat_response.hpp"
 #include "network/simulate.hpp"
 #include "pooling.hpp"
 
@@ -19,12 +20,15 @@ constexpr std::array below_the_warmest = {0.0, 0.004, 0.01, 0.02, 0.04, 0.08, 0.
 constexpr std::array hysteresis_shares = {0.005, 0.012, 0.03, 0.07, 0.16, 0.35};      ///< of the range
 constexpr std::size_t on_off_on = 3;  ///< what switches on and stays on is another effect: heat that sets in
 
-/// The course of a node in a model without the chiller; empty when that cannot be simulated.
+Index column_of(const Simulation& simulation, const std::string& node) {
+    return std::ranges::find(simulation.node_names, node) - simulation.node_names.begin();
+}
+
+/// Empty when the model cannot be simulated.
 Eigen::VectorXd node_course(const Model& model, const Observation& seen, const std::string& node) {
     const auto simulation = simulate(model, seen.inputs, seen.time_s);
     if (!simulation) return {};
-    return simulation->node_C.col(std::ranges::find(simulation->node_names, node) -
-                                  simulation->node_names.begin());
+    return simulation->node_C.col(column_of(*simulation, node));
 }
 
 /// What the node's thermostat felt: the mean of the readings on the node, smoothed over three bins; what the
@@ -58,61 +62,33 @@ std::vector<double> moments_of(const Eigen::VectorXd& felt_C, const std::vector<
     return moments_s;
 }
 
-/// The readings' answer to heat of 1 W that sets in at the beginning: all others are it, moved and added,
-/// because the network around the fit is linear and does not change with time.
-class StepResponse {
-  public:
-    StepResponse(const FitProblem& problem, const Fit& fit, const std::string& node)
-        : time_s_(problem.data().seen.time_s) {
-        const EffectDefinition& steady = *find_effect("motor_heat");
-        const Effect heat = make_effect(steady, steady.forms.front(), node, fit.model);
-        const auto change_C = problem.reading_change_by(fit, heat);
-        if (change_C) step_C_ = *change_C / heat.parameters.front().value;
+/// To 1 W taken away from every odd moment to the next.
+Eigen::MatrixXd answer_to_cooling(const CourseOfReadings& answer_to_heat, const std::vector<double>& time_s,
+                                  const std::vector<double>& moments_s) {
+    Eigen::MatrixXd change_C = Eigen::MatrixXd::Zero(answer_to_heat.rows(), answer_to_heat.columns());
+    double sign = -1.0;
+    for (const double moment_s : moments_s) {
+        const auto first = std::ranges::upper_bound(time_s, moment_s) - time_s.begin();
+        for (Index row = first; row < change_C.rows(); ++row)
+            change_C.row(row) += sign * answer_to_heat.at(time_s[static_cast<std::size_t>(row)] - moment_s);
+        sign = -sign;
     }
-
-    bool known() const { return step_C_.size() > 0; }
-
-    /// To 1 W taken away from every odd moment to the next.
-    Eigen::MatrixXd to_cooling(const std::vector<double>& moments_s) const {
-        Eigen::MatrixXd change_C = Eigen::MatrixXd::Zero(step_C_.rows(), step_C_.cols());
-        double sign = -1.0;
-        for (const double moment_s : moments_s) {
-            for (Index row = 0; row < change_C.rows(); ++row) {
-                const double since_s = time_s_[static_cast<std::size_t>(row)] - moment_s;
-                if (since_s > 0.0) change_C.row(row) += sign * at(since_s);
-            }
-            sign = -sign;
-        }
-        return change_C;
-    }
-
-  private:
-    Eigen::RowVectorXd at(double since_s) const {
-        const double t = time_s_.front() + since_s;
-        const auto after = std::ranges::upper_bound(time_s_, t) - time_s_.begin();
-        if (static_cast<std::size_t>(after) >= time_s_.size()) return step_C_.row(step_C_.rows() - 1);
-        const double t0 = time_s_[static_cast<std::size_t>(after) - 1];
-        const double share = (t - t0) / (time_s_[static_cast<std::size_t>(after)] - t0);
-        return (1.0 - share) * step_C_.row(after - 1) + share * step_C_.row(after);
-    }
-
-    const std::vector<double>& time_s_;
-    Eigen::MatrixXd step_C_;
-};
+    return change_C;
+}
 
 /// Searches the thresholds of a thermostat at one node.
 class ThermostatSearch {
   public:
-    ThermostatSearch(const Evidence& evidence, const FitProblem& problem, const Fit& fit,
-                     const Linearisation& linearisation, const Candidate& candidate)
-        : evidence_(evidence),
+    /// All outlive it.
+    ThermostatSearch(const FitData& run, const Model& model, const Linearisation& linearisation,
+                     const CourseOfReadings& answer_to_heat, const Candidate& candidate)
+        : run_(run),
           linearisation_(linearisation),
-          response_(problem, fit, candidate.at),
-          best_{candidate, make_effect(*candidate.definition, *candidate.form, candidate.at, fit.model),
-                0.0} {}
+          answer_to_heat_(answer_to_heat),
+          best_{candidate, make_effect(*candidate.definition, *candidate.form, candidate.at, model), 0.0} {}
 
     Screened over(const Eigen::VectorXd& felt_C) {
-        if (!response_.known() || felt_C.size() == 0) return best_;
+        if (felt_C.size() == 0) return best_;
         const double warmest_C = felt_C.maxCoeff(), range_C = warmest_C - felt_C.minCoeff();
         for (const double below : below_the_warmest) {
             for (const double hysteresis : hysteresis_shares)
@@ -134,11 +110,11 @@ class ThermostatSearch {
 
   private:
     void look_at(const Eigen::VectorXd& felt_C, double on_C, double hysteresis_C) {
-        const Observation& seen = evidence_.run.seen;
-        const auto moments_s = moments_of(felt_C, seen.time_s, on_C, hysteresis_C);
+        const std::vector<double>& time_s = run_.seen.time_s;
+        const auto moments_s = moments_of(felt_C, time_s, on_C, hysteresis_C);
         if (moments_s.size() < on_off_on) return;
         const Eigen::VectorXd change =
-            pooled(evidence_.run.whitening(response_.to_cooling(moments_s)), static_cast<Index>(seen.rows()));
+            pooled(run_.whitening(answer_to_cooling(answer_to_heat_, time_s, moments_s)), felt_C.size());
         const auto gain = linearisation_.gain_of(change);
         if (gain.amplitude <= 0.0 || gain.log_likelihood <= best_.log_likelihood_gain) return;
         best_.log_likelihood_gain = gain.log_likelihood;
@@ -147,9 +123,9 @@ class ThermostatSearch {
         best_.moments_s = moments_s;
     }
 
-    const Evidence& evidence_;
+    const FitData& run_;
     const Linearisation& linearisation_;
-    StepResponse response_;
+    const CourseOfReadings& answer_to_heat_;
     Screened best_;
 };
 
@@ -187,11 +163,9 @@ std::vector<ThermostatSwitching> switchings_of(const Effect& effect, const Model
                                                const Observation& seen) {
     const auto simulation = simulate(model, seen.inputs, seen.time_s);
     if (!simulation) return {};
-    const auto node = std::ranges::find(simulation->node_names, effect.at) - simulation->node_names.begin();
+    const auto node = static_cast<std::size_t>(column_of(*simulation, effect.at));
     std::vector<ThermostatSwitching> switchings = simulation->switchings;
-    std::erase_if(switchings, [&](const ThermostatSwitching& one) {
-        return static_cast<std::ptrdiff_t>(one.node) != node;
-    });
+    std::erase_if(switchings, [&](const ThermostatSwitching& one) { return one.node != node; });
     return switchings;
 }
 
@@ -201,16 +175,15 @@ Evidence as_seen(Evidence evidence, const std::string& node, const std::vector<d
     return evidence;
 }
 
-/// A fit whose k-th effect ran when it was seen to, as a thermostat: it switches at the temperatures that its
-/// node had then.
-Result<Explanation> set_free(const Evidence& evidence, Explanation scheduled, std::size_t k,
-                             const std::vector<double>& moments_s) {
-    const Observation& seen = evidence.run.seen;
-    const std::string& node = scheduled.effects[k].at;
-    const Evidence schedule = as_seen(evidence, node, moments_s);
-    const auto node_C = node_course(scheduled.fit.model, schedule.run.seen, node);
+/// A fit whose k-th effect ran when it was seen to (`schedule`: as_seen of that), as a thermostat: it
+/// switches at the temperatures that its node had then.
+Result<Explanation> set_free(const Evidence& evidence, const Evidence& schedule, Explanation scheduled,
+                             std::size_t k) {
+    const Observation& seen = schedule.run.seen;
+    const auto node_C = node_course(scheduled.fit.model, seen, scheduled.effects[k].at);
     if (node_C.size() == 0) return fail(NextStep::stop, "the chiller as seen cannot be simulated");
-    const auto [on_C, off_C] = thresholds_C(node_C, seen.time_s, moments_s);
+    const auto [on_C, off_C] =
+        thresholds_C(node_C, seen.time_s, seen.inputs.seen_switchings.back().moments_s);
     const std::size_t effect = evidence.prior_model.effects.size() + k;
     const auto& parameters = scheduled.fit.parameters;
     const auto power = std::ranges::find_if(parameters, [&](const Parameter& parameter) {
@@ -238,24 +211,24 @@ Result<Explanation> explain_thermostat(const Evidence& evidence, const Explanati
     if (!scheduled || (afresh && afresh->fit.point.chi2 < scheduled->fit.point.chi2))
         scheduled = std::move(afresh);
     if (!scheduled) return scheduled;
-    return set_free(evidence, std::move(*scheduled), effects.size() - 1, screened.moments_s);
+    return set_free(evidence, seen, std::move(*scheduled), effects.size() - 1);
 }
 
 Result<Explanation> polish_thermostats(const Evidence& evidence, const Explanation& explanation) {
     auto best = polish(evidence, explanation);
     const std::size_t known = evidence.prior_model.effects.size();
     for (std::size_t k = 0; k < explanation.effects.size(); ++k) {
-        if (!find_effect(explanation.effects[k].kind)->form_of(explanation.effects[k]).steers_itself)
-            continue;
+        if (!form_of(explanation.effects[k]).steers_itself) continue;
         const Model& model = explanation.fit.model;
         std::vector<double> moments_s;
         for (const ThermostatSwitching& one :
              switchings_of(model.effects[known + k], model, evidence.run.seen))
             moments_s.push_back(one.time_s);
         if (moments_s.size() < on_off_on) continue;
-        auto scheduled = polish(as_seen(evidence, explanation.effects[k].at, moments_s), explanation);
+        const Evidence seen = as_seen(evidence, explanation.effects[k].at, moments_s);
+        auto scheduled = polish(seen, explanation);
         if (!scheduled) continue;
-        auto freed = set_free(evidence, std::move(*scheduled), k, moments_s);
+        auto freed = set_free(evidence, seen, std::move(*scheduled), k);
         if (freed && (!best || freed->fit.point.chi2 < best->fit.point.chi2)) best = std::move(freed);
     }
     return best;
@@ -271,7 +244,9 @@ std::vector<Screened> screen_thermostats(const Evidence& evidence, const Explana
     const Linearisation linearisation(fewer);
     std::vector<Screened> screened(nodes.size());
     evidence.parallel_for(nodes.size(), [&](std::size_t i) {
-        ThermostatSearch search(evidence, problem, current.fit, linearisation,
+        const auto answer = answer_to_heat(problem, current.fit, nodes[i]);
+        if (!answer) return;
+        ThermostatSearch search(evidence.run, current.fit.model, linearisation, *answer,
                                 {&chiller, chiller.form("thermostat"), nodes[i]});
         screened[i] = search.over(felt_C(evidence, current, nodes[i]));
     });
@@ -286,7 +261,7 @@ bool switches_off(const Effect& effect, const Model& model, const Observation& s
 }
 
 std::optional<double> cycle_of(const Effect& effect, const Model& model, const Observation& seen) {
-    if (!find_effect(effect.kind)->form_of(effect).steers_itself) return std::nullopt;
+    if (!form_of(effect).steers_itself) return std::nullopt;
     std::vector<double> ons_s;
     for (const ThermostatSwitching& one : switchings_of(effect, model, seen)) {
         if (one.on) ons_s.push_back(one.time_s);

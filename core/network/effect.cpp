@@ -66,6 +66,17 @@ const EffectForm& EffectDefinition::form_of(const Effect& effect) const {
     return *form(effect.form);
 }
 
+const EffectForm& form_of(const Effect& effect) {
+    return find_effect(effect.kind)->form_of(effect);
+}
+
+std::optional<double> onset_of(const Effect& effect) {
+    for (const EffectParameterDefinition& parameter : form_of(effect).parameters) {
+        if (parameter.is_time && !parameter.when_absent) return effect.parameter(parameter.name);
+    }
+    return std::nullopt;
+}
+
 const EffectDefinition* find_effect(std::string_view kind) {
     const auto found = std::ranges::find(effect_catalogue(), kind, &EffectDefinition::kind);
     return found == effect_catalogue().end() ? nullptr : &*found;

@@ -98,7 +98,7 @@ std::vector<Parameter> parameters_of(const Model& model) {
         },
         [&](const Ambient& ambient) { parameters.push_back(ambient_parameter(ambient)); },
         [&](std::size_t effect, const EffectParameter& given) {
-            const EffectForm& form = find_effect(model.effects[effect].kind)->form_of(model.effects[effect]);
+            const EffectForm& form = form_of(model.effects[effect]);
             const auto definition =
                 std::ranges::find(form.parameters, given.name, &EffectParameterDefinition::name);
             parameters.push_back(effect_parameter(model, effect, *definition, given));
@@ -122,7 +122,7 @@ void set_parameter_sigmas(Model& model, std::span<const double> coordinate_sigma
         model, [&](Uncertain& number, auto) { number.relative_sigma = relative_from_log(sigma()); },
         [&](Ambient& ambient) { ambient.sigma_C = sigma(); },
         [&](std::size_t effect, EffectParameter& parameter) {
-            const EffectForm& form = find_effect(model.effects[effect].kind)->form_of(model.effects[effect]);
+            const EffectForm& form = form_of(model.effects[effect]);
             const auto definition =
                 std::ranges::find(form.parameters, parameter.name, &EffectParameterDefinition::name);
             const double own = sigma();

@@ -96,6 +96,11 @@ const std::vector<EffectDefinition>& effect_catalogue();
 /// Null when the kind is unknown.
 const EffectDefinition* find_effect(std::string_view kind);
 
+/// REQUIRES: the effect's kind and form are known.
+const EffectForm& form_of(const Effect& effect);
+/// When an effect sets in; none where it always acts. REQUIRES: as form_of.
+std::optional<double> onset_of(const Effect& effect);
+
 /// A parameter's bounds and prior in its own unit, for one model.
 struct ResolvedPrior {
     double lower;
