@@ -44,6 +44,20 @@ void sync_folder(const std::filesystem::path& file) {
     close(fd);
 }
 
+/// The database last: as long as it is in place, the next start sees that it has to follow its log.
+Result<void> rename_with_log(const std::filesystem::path& database, const std::string& target) {
+    for (const char* suffix : {"-wal", "-shm", ""}) {
+        std::error_code error;
+        std::filesystem::rename(database.string() + suffix, target + suffix, error);
+        if (error && error != std::errc::no_such_file_or_directory)
+            return fail(NextStep::stop,
+                        fmt::format("database {}: damaged, and cannot be renamed to {}: {}",
+                                    database.string() + suffix, target + suffix, error.message()));
+    }
+    sync_folder(database);
+    return {};
+}
+
 }  // namespace
 
 Result<WriterLock> WriterLock::take(const std::filesystem::path& database) {
@@ -107,24 +121,6 @@ Result<bool> is_damaged(const std::filesystem::path& database, int busy_timeout_
     return !sound;
 }
 
-namespace {
-
-/// The database last: as long as it is in place, the next start sees that it has to follow its log.
-Result<void> rename_with_log(const std::filesystem::path& database, const std::string& target) {
-    for (const char* suffix : {"-wal", "-shm", ""}) {
-        std::error_code error;
-        std::filesystem::rename(database.string() + suffix, target + suffix, error);
-        if (error && error != std::errc::no_such_file_or_directory)
-            return fail(NextStep::stop,
-                        fmt::format("database {}: damaged, and cannot be renamed to {}: {}",
-                                    database.string() + suffix, target + suffix, error.message()));
-    }
-    sync_folder(database);
-    return {};
-}
-
-}  // namespace
-
 Result<std::filesystem::path> put_aside(const std::filesystem::path& database, Moment now) {
     const auto seconds = static_cast<std::time_t>(now.wall_ns / 1'000'000'000);
     const auto stem = fmt::format("{}.damaged-{:%Y%m%dT%H%M%SZ}", database.string(), fmt::gmtime(seconds));
@@ -138,9 +134,10 @@ Result<void> finish_put_aside(const std::filesystem::path& database) {
     const std::string begins = database.filename().string() + ".damaged-";
     constexpr std::string_view log = "-wal";
     std::error_code error;
-    for (const auto& entry : std::filesystem::directory_iterator(folder_of(database), error)) {
-        std::string target = entry.path().string();
-        if (!entry.path().filename().string().starts_with(begins) || !target.ends_with(log)) continue;
+    for (std::filesystem::directory_iterator entry(folder_of(database), error), end; !error && entry != end;
+         entry.increment(error)) {
+        std::string target = entry->path().string();
+        if (!entry->path().filename().string().starts_with(begins) || !target.ends_with(log)) continue;
         target.resize(target.size() - log.size());
         if (!std::filesystem::exists(target)) return rename_with_log(database, target);
     }
