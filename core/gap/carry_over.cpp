@@ -1,8 +1,10 @@
 #include "carry_over.hpp"
 
 #include <cmath>
+#include <string>
+#include <vector>
 
-#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace thermbal {
 namespace {
@@ -40,17 +42,19 @@ void withdraw_what_closes_no_gap(Diagnosis& diagnosis) {
     if (diagnosis.effects.empty() || of_the_run >= least_of_the_run || of_holdouts >= least_of_holdouts)
         return;
     std::vector<Suspect> withdrawn;
-    for (const FoundEffect& found : diagnosis.effects)
+    std::vector<std::string> places;
+    for (const FoundEffect& found : diagnosis.effects) {
         withdrawn.push_back({found.effect.kind, found.at, found.probability, 0.0});
+        places.push_back(fmt::format("{} at {}", found.effect.kind, found.at));
+    }
     diagnosis.suspects.insert(diagnosis.suspects.begin(), withdrawn.begin(), withdrawn.end());
     diagnosis.effects.clear();
     diagnosis.disagreements.clear();
     diagnosis.residual_heat.clear();
     diagnosis.extended = diagnosis.calibrated;
     diagnosis.verdict = GapVerdict::agrees;
-    diagnosis.reason =
-        fmt::format("{} would explain something, but no run is described better with it: see the suspects",
-                    withdrawn.front().kind);
+    diagnosis.reason = fmt::format("what was found describes no run better, so that it is not named: {}",
+                                   fmt::join(places, ", "));
     forget_effects(diagnosis.run);
     for (RunComparison& held : diagnosis.holdouts) forget_effects(held);
 }

@@ -159,6 +159,7 @@ TEST(Diagnose, AnEffectIsNotNamedToFillAGapThatItDoesNotClose) {
     EXPECT_EQ(useless.verdict, GapVerdict::agrees);
     ASSERT_EQ(useless.suspects.size(), 1U);
     EXPECT_EQ(useless.suspects.front().kind, "sensor_lag");
+    EXPECT_NE(useless.reason.find("sensor_lag"), std::string::npos) << "a person reads what it was";
     EXPECT_EQ(useless.run.after_rmse_C, 0.05);
     EXPECT_EQ(withdrawn_if_useless(0.045, 0.06).effects.size(), 1U) << "the run is described better";
     EXPECT_EQ(withdrawn_if_useless(0.05, 0.045).effects.size(), 1U) << "the held-out run is";
