@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -34,6 +36,38 @@ class HeldOutFold {
     const Eigen::MatrixXd* by_row_;
     std::vector<Eigen::Index> held_out_;
     Eigen::VectorXd held_out_targets_;
+};
+
+/// All folds of a cross-validation on the same features, each made when it is first asked for. The arguments
+/// of the constructor but `kernel` must outlive it; one object a thread.
+class FoldsOnFeatures {
+  public:
+    FoldsOnFeatures(KernelFeatures kernel, const std::vector<Fold>& folds, const Eigen::VectorXd& targets,
+                    double epsilon)
+        : kernel_(std::move(kernel)),
+          system_(kernel_.by_row),
+          folds_(folds),
+          targets_(targets),
+          epsilon_(epsilon),
+          fitted_(folds.size()) {}
+    FoldsOnFeatures(const FoldsOnFeatures&) = delete;
+
+    const KernelFeatures& kernel() const { return kernel_; }
+    HeldOutFold& operator[](std::size_t f) {
+        if (!fitted_[f]) fitted_[f].emplace(kernel_, system_, folds_[f], targets_, epsilon_);
+        return *fitted_[f];
+    }
+    std::size_t kept_numbers() const {
+        return static_cast<std::size_t>(kernel_.by_row.size()) + system_.kept_numbers();
+    }
+
+  private:
+    KernelFeatures kernel_;
+    NewtonSystem system_;
+    const std::vector<Fold>& folds_;
+    const Eigen::VectorXd& targets_;
+    double epsilon_;
+    std::vector<std::optional<HeldOutFold>> fitted_;
 };
 
 }  // namespace thermbal

@@ -11,27 +11,11 @@ namespace thermbal {
 
 namespace {
 
-/// Every stride-th row, lag by lag: lag l of row k * stride is at()[l][k].
-class StridedLags {
-  public:
-    StridedLags(const LagProblem& problem, std::size_t stride) : phases_(stride) {
-        for (std::size_t k = 0; k < problem.unit.size(); ++k) phases_[k % stride].push_back(problem.unit[k]);
-        for (std::size_t l = 0; l < problem.lags; ++l)
-            lagged_.push_back(phases_[l % stride].data() + l / stride);
-    }
-
-    const double* const* at() const { return lagged_.data(); }
-
-  private:
-    std::vector<std::vector<double>> phases_;
-    std::vector<const double*> lagged_;
-};
-
-/// One row's features side by side.
-Eigen::MatrixXd rows_of(const std::vector<std::vector<double>>& features) {
-    const auto rank = static_cast<Eigen::Index>(features.size());
+/// One row's features side by side, the first `count` of them.
+Eigen::MatrixXd rows_of(const std::vector<std::vector<double>>& features, std::size_t count) {
+    const auto rank = static_cast<Eigen::Index>(count);
     const auto rows = static_cast<Eigen::Index>(features.front().size());
-    const auto padded = static_cast<Eigen::Index>(vector_loops::padded(features.size()));
+    const auto padded = static_cast<Eigen::Index>(vector_loops::padded(count));
     Eigen::MatrixXd by_row(padded, rows);
     by_row.bottomRows(padded - rank).setZero();
     for (Eigen::Index k = 0; k < rank; ++k) {
@@ -51,40 +35,61 @@ std::vector<Eigen::Index> columns_of(const std::vector<std::size_t>& rows, std::
 
 }  // namespace
 
+KernelFactorisation::KernelFactorisation(const LagProblem& problem, double sigma, std::size_t stride)
+    : problem_(&problem),
+      sigma_(sigma),
+      stride_(stride),
+      rows_((problem.rows() + stride - 1) / stride),
+      phases_(stride),
+      left_over_(rows_, 1.0) {
+    for (std::size_t k = 0; k < problem.unit.size(); ++k) phases_[k % stride].push_back(problem.unit[k]);
+    for (std::size_t l = 0; l < problem.lags; ++l) {
+        lagged_.push_back(phases_[l % stride].data() + l / stride);
+    }
+}
+
+void KernelFactorisation::extend_to(double tolerance) {
+    while (pivots_.size() < rows_) {
+        const auto largest = std::ranges::max_element(left_over_);
+        if (!(*largest > tolerance)) break;
+        add_pivot(static_cast<std::size_t>(largest - left_over_.begin()));
+    }
+}
+
+void KernelFactorisation::add_pivot(std::size_t pivot) {
+    const std::size_t rank = pivots_.size();
+    std::vector<double> pivot_row(rank);
+    for (std::size_t k = 0; k < rank; ++k) pivot_row[k] = features_[k][pivot];
+    largest_left_over_.push_back(left_over_[pivot]);
+    const double diagonal = std::sqrt(left_over_[pivot]);
+    std::vector<double>& column = features_.emplace_back(rows_);
+    vector_loops::squared_distances_to(lagged_.data(), rows_, problem_->input(pivot * stride_).data(),
+                                       problem_->lags, column.data());
+    vector_loops::scaled_exp(column.data(), rows_, -1.0 / (sigma_ * sigma_));
+    vector_loops::subtract_columns(columns_.data(), rows_, rank, pivot_row.data(), column.data());
+    for (std::size_t i = 0; i < rows_; ++i) {
+        column[i] /= diagonal;
+        left_over_[i] -= column[i] * column[i];
+    }
+    left_over_[pivot] = 0.0;
+    columns_.push_back(column.data());
+    pivots_.push_back(pivot * stride_);
+}
+
+KernelFeatures KernelFactorisation::features(double tolerance) {
+    extend_to(tolerance);
+    const auto beyond =
+        std::ranges::find_if(largest_left_over_, [tolerance](double error) { return error <= tolerance; });
+    const auto rank = beyond - largest_left_over_.begin();
+    return {.by_row = rows_of(features_, static_cast<std::size_t>(rank)),
+            .pivots = {pivots_.begin(), pivots_.begin() + rank},
+            .left_over = {largest_left_over_.begin(), beyond},
+            .stride = stride_};
+}
+
 KernelFeatures kernel_features(const LagProblem& problem, double sigma, double tolerance,
                                std::size_t stride) {
-    const StridedLags lags(problem, stride);
-    const std::size_t rows = (problem.rows() + stride - 1) / stride;
-    std::vector<double> left_over(rows, 1.0);
-    std::vector<std::vector<double>> features;
-    std::vector<const double*> columns;
-    std::vector<double> pivot_row;
-    KernelFeatures kernel;
-    kernel.stride = stride;
-    while (kernel.pivots.size() < rows) {
-        const auto largest = std::ranges::max_element(left_over);
-        if (!(*largest > tolerance)) break;
-        const std::size_t rank = kernel.pivots.size();
-        const auto pivot = static_cast<std::size_t>(largest - left_over.begin());
-        pivot_row.resize(rank);
-        for (std::size_t k = 0; k < rank; ++k) pivot_row[k] = columns[k][pivot];
-        kernel.left_over.push_back(*largest);
-        const double diagonal = std::sqrt(*largest);
-        std::vector<double>& column = features.emplace_back(rows);
-        vector_loops::squared_distances_to(lags.at(), rows, problem.input(pivot * stride).data(),
-                                           problem.lags, column.data());
-        vector_loops::scaled_exp(column.data(), rows, -1.0 / (sigma * sigma));
-        vector_loops::subtract_columns(columns.data(), rows, rank, pivot_row.data(), column.data());
-        for (std::size_t i = 0; i < rows; ++i) {
-            column[i] /= diagonal;
-            left_over[i] -= column[i] * column[i];
-        }
-        left_over[pivot] = 0.0;
-        columns.push_back(column.data());
-        kernel.pivots.push_back(pivot * stride);
-    }
-    kernel.by_row = rows_of(features);
-    return kernel;
+    return KernelFactorisation(problem, sigma, stride).features(tolerance);
 }
 
 std::size_t KernelFeatures::rank_at(double tolerance) const {

@@ -1,6 +1,7 @@
 #include "low_rank_grid.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <limits>
 #include <numeric>
@@ -11,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "linear_floor.hpp"
+#include "race_bounds.hpp"
 #include "regression/kernel_features.hpp"
 #include "regression/tube_solver.hpp"
 #include "regression/vector_loops.hpp"
@@ -27,12 +29,19 @@ constexpr std::size_t most_kept_numbers = 500'000;  ///< 4 MB
 /// (README.md): never below 0.89.
 constexpr double below_linear = 0.8;
 
+/// A window whose folds no linear predictor follows to so many epsilons, at its own rows, is noise.
+constexpr double noise_in_epsilons = 3.0;
+
 constexpr TubeSolver::Schedule wide{
     .first_smoothing = 0.5, .factor = 0.1, .last_smoothing = 1e-3, .most_steps = 1000};
 constexpr TubeSolver::Schedule exact{
     .first_smoothing = 1e-3, .factor = 0.1, .last_smoothing = 1e-8, .most_steps = 1000};
 constexpr double wide_tolerance_factor = 1000.0;
 constexpr double exact_tolerance_factor = 0.01;
+
+VectorXd all_targets(const LagProblem& problem) {
+    return Eigen::Map<const VectorXd>(problem.targets().data(), static_cast<Eigen::Index>(problem.rows()));
+}
 
 std::vector<Eigen::Index> all_rows(const VectorXd& targets) {
     std::vector<Eigen::Index> rows(static_cast<std::size_t>(targets.size()));
@@ -62,20 +71,19 @@ class GridSearch {
     GridSearch(const LagProblem& problem, const SweepOptions& options, const Cancelled& cancelled)
         : options_(options),
           cancelled_(cancelled),
+          targets_(all_targets(problem)),
           folds_(make_folds(problem.rows(), options.folds, options.fold_kind, options.fold_seed)),
           least_rmse_(linear_floor(problem, folds_)) {
         for (double& rmse : least_rmse_) rmse *= below_linear;
         for (std::size_t sigma = 0; sigma < options.sigma_grid.size(); ++sigma) {
-            columns_.emplace_back(problem, sigma, folds_, options);
+            columns_.emplace_back(problem, sigma, folds_, options, targets_);
         }
     }
 
-    /// Wide kernels first: they are the cheapest and mostly hold the best point.
     Result<GridChoice> run() {
-        for (std::size_t sigma = columns_.size(); sigma-- > 0 && !narrower_is_hopeless();) {
-            if (auto looked = look_at_column(sigma); !looked) return std::unexpected(looked.error());
+        if (auto looked = is_noise() ? rank_all_columns() : look_at_columns(); !looked) {
+            return std::unexpected(looked.error());
         }
-        sort_waiting();
         for (const SigmaCandidate& candidate : waiting_) {
             if (auto done = cross_validate(candidate); !done) return std::unexpected(done.error());
         }
@@ -83,9 +91,44 @@ class GridSearch {
     }
 
   private:
+    bool is_noise() const { return noise_rmse() > noise_in_epsilons * options_.epsilon; }
+    double noise_rmse() const {
+        double sum = 0.0;
+        for (const double rmse : least_rmse_) sum += rmse * rmse;
+        return std::sqrt(sum / static_cast<double>(least_rmse_.size()));
+    }
+
+    /// Where all points of the grid lie within a factor of two, a rough ranking by all folds costs less than
+    /// one fold to the end.
+    Result<void> rank_all_columns() {
+        double limit_mse = std::numeric_limits<double>::infinity();
+        for (std::size_t sigma = columns_.size(); sigma-- > 0;) {
+            auto found = columns_[sigma].rough().rank_by_all_folds(noise_rmse(), limit_mse, cancelled_);
+            if (!found) return std::unexpected(found.error());
+            for (const SigmaCandidate& candidate : *found) {
+                limit_mse = std::min(limit_mse, rough_margin * rough_margin * candidate.rough_mean_mse);
+            }
+            std::ranges::move(*found, std::back_inserter(waiting_));
+        }
+        std::erase_if(waiting_, [limit_mse](const SigmaCandidate& candidate) {
+            return candidate.rough_mean_mse > limit_mse;
+        });
+        sort_waiting(&SigmaCandidate::rough_mean_mse);
+        return {};
+    }
+
+    /// Wide kernels first: they are the cheapest and mostly hold the best point.
+    Result<void> look_at_columns() {
+        for (std::size_t sigma = columns_.size(); sigma-- > 0 && !narrower_is_hopeless();) {
+            if (auto looked = look_at_column(sigma); !looked) return looked;
+        }
+        sort_waiting(&SigmaCandidate::rough_rmse);
+        return {};
+    }
+
     /// The most promising point so far is cross-validated at once: a low bound saves the most.
     Result<void> look_at_column(std::size_t sigma) {
-        auto found = columns_[sigma].look_for_candidates(best_mean_mse_, true, cancelled_);
+        auto found = columns_[sigma].rough().look_at_first_fold(best_mean_mse_, true, cancelled_);
         if (!found) return std::unexpected(found.error());
         const auto least = std::ranges::min_element(*found, {}, &SigmaCandidate::rough_rmse);
         least_by_column_.push_back(least->rough_rmse);
@@ -105,24 +148,32 @@ class GridSearch {
     }
 
     /// Column by column, so that none is made twice where not all can be kept; the most promising first.
-    void sort_waiting() {
+    void sort_waiting(double SigmaCandidate::* promise) {
         std::vector<double> least(columns_.size(), std::numeric_limits<double>::infinity());
         for (const SigmaCandidate& candidate : waiting_) {
             double& of_column = least[candidate.sigma_index];
-            of_column = std::min(of_column, candidate.rough_rmse);
+            of_column = std::min(of_column, candidate.*promise);
         }
         std::ranges::stable_sort(waiting_, {}, [&](const SigmaCandidate& candidate) {
-            return std::tuple(least[candidate.sigma_index], candidate.sigma_index, candidate.rough_rmse);
+            return std::tuple(least[candidate.sigma_index], candidate.sigma_index, candidate.*promise);
         });
     }
 
     Result<void> cross_validate(const SigmaCandidate& candidate) {
         let_go_of_others(candidate.sigma_index);
         const auto mse =
-            columns_[candidate.sigma_index].mean_mse(candidate, best_mean_mse_, least_rmse_, cancelled_);
+            columns_[candidate.sigma_index].mean_mse(candidate, terms_against(candidate), cancelled_);
         if (!mse) return std::unexpected(mse.error());
         if (*mse) offer(**mse, candidate.sigma_index, candidate.C_index);
         return {};
+    }
+
+    /// Before anything is to be beaten: the first fold alone makes so much of the mean.
+    RaceTerms terms_against(const SigmaCandidate& candidate) const {
+        const double of_first = candidate.rough_rmse / std::sqrt(static_cast<double>(folds_.size()));
+        return {.bound = best_mean_mse_,
+                .least_rmse = least_rmse_,
+                .small_rmse = std::min(std::sqrt(best_mean_mse_), of_first)};
     }
 
     /// Rough windows have kernels of a rank in the hundreds: all columns together would take a gigabyte.
@@ -145,6 +196,7 @@ class GridSearch {
 
     const SweepOptions& options_;
     const Cancelled& cancelled_;
+    VectorXd targets_;
     std::vector<Fold> folds_;
     std::vector<double> least_rmse_;  ///< fold by fold
     std::vector<SigmaColumn> columns_;
@@ -167,14 +219,16 @@ Result<std::vector<double>> cross_validate_low_rank(const LagProblem& problem, c
     constexpr double no_bound = std::numeric_limits<double>::infinity();
     const auto folds = make_folds(problem.rows(), options.folds, options.fold_kind, options.fold_seed);
     const std::vector<double> nothing_expected(folds.size());
+    const RaceTerms everything{.bound = no_bound, .least_rmse = nothing_expected};
+    const VectorXd targets = all_targets(problem);
     std::vector<double> all;
     for (std::size_t sigma = 0; sigma < options.sigma_grid.size(); ++sigma) {
-        SigmaColumn column(problem, sigma, folds, options);
-        auto candidates = column.look_for_candidates(no_bound, false, cancelled);
+        SigmaColumn column(problem, sigma, folds, options, targets);
+        auto candidates = column.rough().look_at_first_fold(no_bound, false, cancelled);
         if (!candidates) return std::unexpected(candidates.error());
         std::ranges::sort(*candidates, {}, &SigmaCandidate::C_index);
         for (const SigmaCandidate& candidate : *candidates) {
-            const auto mse = column.mean_mse(candidate, no_bound, nothing_expected, cancelled);
+            const auto mse = column.mean_mse(candidate, everything, cancelled);
             if (!mse) return std::unexpected(mse.error());
             all.push_back(**mse);
         }
@@ -186,8 +240,7 @@ Result<SvrModel> fit_model_low_rank(const LagProblem& problem, double C, double 
                                     const SweepOptions& options) {
     const KernelFeatures kernel =
         kernel_features(problem, sigma, exact_tolerance_factor * feature_tolerance(sigma));
-    const Eigen::Map<const VectorXd> targets(problem.targets().data(),
-                                             static_cast<Eigen::Index>(problem.rows()));
+    const VectorXd targets = all_targets(problem);
     NewtonSystem system(kernel.by_row);
     TubeSolver solver(system, all_rows(targets), targets, options.epsilon);
     const TubeSolver::State start = near_the_optimum(kernel, targets, C, sigma, options.epsilon);

@@ -25,7 +25,35 @@ struct KernelFeatures {
 };
 
 /// Cholesky's factorisation with diagonal pivoting (Fine & Scheinberg 2001), until no diagonal element is off
-/// by more than `tolerance`; a function with weights c is then off by at most tolerance * |c|_1.
+/// by more than a tolerance; a function with weights c is then off by at most tolerance * |c|_1. It goes on
+/// from where it is when a smaller tolerance is asked for. `problem` must outlive it.
+class KernelFactorisation {
+  public:
+    explicit KernelFactorisation(const LagProblem& problem, double sigma, std::size_t stride = 1);
+    KernelFactorisation(const KernelFactorisation&) = delete;
+    KernelFactorisation(KernelFactorisation&&) = default;
+
+    KernelFeatures features(double tolerance);
+    std::size_t kept_numbers() const { return features_.size() * rows_; }
+
+  private:
+    void extend_to(double tolerance);
+    void add_pivot(std::size_t pivot);
+
+    const LagProblem* problem_;
+    double sigma_;
+    std::size_t stride_;
+    std::size_t rows_;
+    std::vector<std::vector<double>> phases_;  ///< every stride-th sample, from the first, the second ... on
+    std::vector<const double*> lagged_;        ///< lag l of row k * stride is lagged_[l][k]
+    std::vector<double> left_over_;            ///< of every diagonal element
+    std::vector<std::vector<double>> features_;
+    std::vector<const double*> columns_;  ///< features_
+    std::vector<std::size_t> pivots_;
+    std::vector<double> largest_left_over_;  ///< before each pivot, falling
+};
+
+/// The features of one factorisation.
 KernelFeatures kernel_features(const LagProblem& problem, double sigma, double tolerance,
                                std::size_t stride = 1);
 

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstddef>
+
+namespace thermbal {
+
+/// Below what a held-out error will not fall when the smoothing goes on to 0, from what the last step of
+/// smoothing has done.
+double lowest_rmse(double rmse, double before, double smoothing);
+
+/// The first fold's error that is hopeless where the best mean squared error over `folds` folds is
+/// `best_mean_mse`.
+double hopeless_rmse(double best_mean_mse, std::size_t folds);
+
+/// To where a kernel may be truncated when an error of `share` of `rmse` in the predictions does not matter:
+/// no prediction moves by more than the tolerance times the sum of |c|. In steps, so that an error a little
+/// smaller is no reason to begin anew; never below `finest`.
+double truncation(double share, double rmse, double coefficient_sum, double finest);
+
+}  // namespace thermbal

@@ -1,0 +1,156 @@
+#include "rough_column.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "race_bounds.hpp"
+
+namespace thermbal {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+constexpr std::size_t rough_rows = 400;
+constexpr double rough_tolerance_factor = 100.0;
+constexpr double rough_truncation_share = 0.3;
+constexpr std::array first_smoothings{0.03, 0.003};
+constexpr double next_folds_smoothing = 0.01;
+
+/// A tenth of the error to beat, as far as that is known.
+double rough_smoothing(double best_mean_mse) {
+    return std::clamp(0.1 * std::sqrt(best_mean_mse), 3e-4, 3e-3);
+}
+
+/// The first fold at the solver's C, smoothing by smoothing.
+struct RoughFit {
+    double rmse = 0.0;
+    double lowest_rmse = 0.0;
+};
+RoughFit fit_roughly(HeldOutFold& fold, double last_smoothing) {
+    const double before = fold.rmse_at(first_smoothings[0]);
+    if (first_smoothings[1] > last_smoothing) static_cast<void>(fold.rmse_at(first_smoothings[1]));
+    const double rmse = fold.rmse_at(last_smoothing);
+    return {rmse, lowest_rmse(rmse, before, last_smoothing)};
+}
+
+TubeSolver::State padded(TubeSolver::State state, Index rank) {
+    if (state.weights.size() < rank) state.weights.conservativeResizeLike(VectorXd::Zero(rank));
+    return state;
+}
+
+}  // namespace
+
+RoughColumn::RoughColumn(const LagProblem& problem, std::size_t sigma_index, const std::vector<Fold>& folds,
+                         const SweepOptions& options, const VectorXd& targets)
+    : problem_(problem),
+      sigma_index_(sigma_index),
+      sigma_(options.sigma_grid[sigma_index]),
+      folds_(folds),
+      options_(options),
+      targets_(targets),
+      stride_(std::max<std::size_t>(1, problem.rows() / rough_rows)) {}
+
+Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(double best_mean_mse, bool skip_hopeless,
+                                                                    const Cancelled& cancelled) {
+    const double tolerance = rough_tolerance_factor * feature_tolerance(sigma_);
+    fitted_ = std::make_unique<FoldsOnFeatures>(kernel_features(problem_, sigma_, tolerance, stride_), folds_,
+                                                targets_, options_.epsilon);
+    HeldOutFold& first = (*fitted_)[0];
+    const double hopeless = hopeless_rmse(best_mean_mse, folds_.size());
+    TubeSolver::State state = first.solver().cold_start();
+    double largest_coefficient = std::numeric_limits<double>::infinity();
+    std::vector<SigmaCandidate> candidates;
+    for (std::size_t k = options_.C_grid.size(); k-- > 0;) {
+        if (cancelled()) return sweep_cancelled();
+        const double C = options_.C_grid[k] * static_cast<double>(stride_);
+        // A C that holds no row back is the same fit as a larger one.
+        if (largest_coefficient < C) {
+            candidates.push_back(candidates.back());
+            candidates.back().C_index = k;
+            continue;
+        }
+        first.start(C, state);
+        const RoughFit fit = fit_roughly(first, rough_smoothing(best_mean_mse));
+        state = first.solver().state();
+        const VectorXd& coefficients = first.solver().coefficients();
+        largest_coefficient = coefficients.lpNorm<Eigen::Infinity>();
+        const bool grows = !candidates.empty() && fit.rmse > candidates.back().rough_rmse;
+        candidates.push_back({.sigma_index = sigma_index_,
+                              .C_index = k,
+                              .rough_rmse = fit.rmse,
+                              .lowest_rmse = fit.lowest_rmse,
+                              .coefficient_sum = coefficients.lpNorm<1>(),
+                              .rough_mean_mse = 0.0,
+                              .rough_state = state});
+        if (skip_hopeless && grows && fit.rmse > hopeless) break;
+    }
+    return candidates;
+}
+
+Result<std::vector<SigmaCandidate>> RoughColumn::rank_by_all_folds(double noise_rmse, double limit_mse,
+                                                                   const Cancelled& cancelled) {
+    const double finest = rough_tolerance_factor * feature_tolerance(sigma_);
+    const double smoothing = rough_smoothing(noise_rmse * noise_rmse);
+    KernelFactorisation factorisation(problem_, sigma_, stride_);
+    double tolerance = std::numeric_limits<double>::infinity();
+    SigmaCandidate candidate;
+    candidate.sigma_index = sigma_index_;
+    std::vector<SigmaCandidate> candidates;
+    for (std::size_t k = 0; k < options_.C_grid.size(); ++k) {
+        if (cancelled()) return sweep_cancelled();
+        const double C = options_.C_grid[k] * static_cast<double>(stride_);
+        // Held back by C or not, no coefficient grows by more than C does.
+        const double largest_sum =
+            k == 0 ? options_.C_grid[k] * static_cast<double>(problem_.rows())
+                   : candidate.coefficient_sum * options_.C_grid[k] / options_.C_grid[k - 1];
+        const double wanted = truncation(rough_truncation_share, noise_rmse, largest_sum, finest);
+        if (wanted < tolerance) {
+            tolerance = wanted;
+            fitted_ = std::make_unique<FoldsOnFeatures>(factorisation.features(tolerance), folds_, targets_,
+                                                        options_.epsilon);
+        }
+        HeldOutFold& first = (*fitted_)[0];
+        first.start(C, k == 0 ? first.solver().cold_start()
+                              : padded(candidate.rough_state, fitted_->kernel().by_row.rows()));
+        const double before = candidate.rough_rmse;
+        candidate.C_index = k;
+        candidate.rough_rmse = fit_roughly(first, smoothing).rmse;
+        candidate.rough_state = first.solver().state();
+        candidate.coefficient_sum = first.solver().coefficients().lpNorm<1>();
+        candidate.rough_mean_mse = mean_of_all_folds(candidate, smoothing, limit_mse);
+        if (candidate.rough_mean_mse <= limit_mse) {
+            limit_mse = std::min(limit_mse, rough_margin * rough_margin * candidate.rough_mean_mse);
+            candidates.push_back(candidate);
+        }
+        if (k > 0 && candidate.rough_rmse > before &&
+            candidate.rough_rmse > hopeless_rmse(limit_mse, folds_.size()))
+            break;
+    }
+    return candidates;
+}
+
+/// Every fold only adds to the mean.
+double RoughColumn::mean_of_all_folds(SigmaCandidate& candidate, double smoothing, double limit_mse) {
+    const double C = options_.C_grid[candidate.C_index] * static_cast<double>(stride_);
+    const auto count = static_cast<double>(folds_.size());
+    double sum = candidate.rough_rmse * candidate.rough_rmse;
+    for (std::size_t f = 1; f < folds_.size() && sum <= limit_mse * count; ++f) {
+        HeldOutFold& fold = (*fitted_)[f];
+        fold.start(C, candidate.rough_state);
+        static_cast<void>(fold.rmse_at(next_folds_smoothing));
+        const double rmse = fold.rmse_at(smoothing);
+        sum += rmse * rmse;
+    }
+    return sum / count;
+}
+
+TubeSolver::State RoughColumn::on(const KernelFeatures& kernel, const TubeSolver::State& rough) const {
+    const KernelFeatures& from = fitted_->kernel();
+    const TubeSolver::State all = padded(rough, from.by_row.rows());
+    return {weights_of(kernel, from.pivots, pivot_coefficients(from, all.weights)), all.bias};
+}
+
+}  // namespace thermbal

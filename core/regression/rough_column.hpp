@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "held_out_fold.hpp"
+#include "regression/folds.hpp"
+#include "regression/kernel_features.hpp"
+#include "regression/lags.hpp"
+#include "regression/sweep.hpp"
+#include "regression/tube_solver.hpp"
+
+namespace thermbal {
+
+/// A point of the grid after a rough fit.
+struct SigmaCandidate {
+    std::size_t sigma_index = 0;
+    std::size_t C_index = 0;
+    double rough_rmse = 0.0;       ///< of the first fold
+    double lowest_rmse = 0.0;      ///< below which the first fold's error will not fall
+    double coefficient_sum = 0.0;  ///< of |alpha - alpha*|, about that of all rows
+    double rough_mean_mse = 0.0;   ///< over all folds, from rank_by_all_folds() alone
+    TubeSolver::State rough_state;
+};
+
+/// On windows of noise the point that wins on all rows is among those whose rough error is at most this much
+/// larger than the least. Measured (README.md): up to 1.06.
+constexpr double rough_margin = 1.15;
+
+/// Where on one sigma's column of the grid to look: fits on every few rows, C made up for them, and not to
+/// the last digit. The arguments of the constructor must outlive it; one object a thread.
+class RoughColumn {
+  public:
+    RoughColumn(const LagProblem& problem, std::size_t sigma_index, const std::vector<Fold>& folds,
+                const SweepOptions& options, const Eigen::VectorXd& targets);
+
+    /// The first fold alone, from the largest C down, each from the one before; with `skip_hopeless` no
+    /// further than where the error is hopeless and grows. At least one candidate. Error: stop when
+    /// cancelled.
+    Result<std::vector<SigmaCandidate>> look_at_first_fold(double best_mean_mse, bool skip_hopeless,
+                                                           const Cancelled& cancelled);
+
+    /// All folds, from the smallest C up, for windows of noise: `noise_rmse` is about what no error falls
+    /// below. A candidate whose mean is above `limit_mse` is left out. Error: stop when cancelled.
+    Result<std::vector<SigmaCandidate>> rank_by_all_folds(double noise_rmse, double limit_mse,
+                                                          const Cancelled& cancelled);
+
+    /// The same function on other features, which must hold the rows of these.
+    TubeSolver::State on(const KernelFeatures& kernel, const TubeSolver::State& rough) const;
+
+  private:
+    double mean_of_all_folds(SigmaCandidate& candidate, double smoothing, double limit_mse);
+
+    const LagProblem& problem_;
+    std::size_t sigma_index_;
+    double sigma_;
+    const std::vector<Fold>& folds_;
+    const SweepOptions& options_;
+    const Eigen::VectorXd& targets_;
+    std::size_t stride_;
+    std::unique_ptr<FoldsOnFeatures> fitted_;
+};
+
+}  // namespace thermbal
