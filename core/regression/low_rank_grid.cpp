@@ -31,6 +31,9 @@ constexpr double below_linear = 0.8;
 
 /// A window whose folds no linear predictor follows to so many epsilons, at its own rows, is noise.
 constexpr double noise_in_epsilons = 3.0;
+/// A column is worse when its least rough error is so much above the least of all.
+constexpr double worse_column = 1.03;
+constexpr int most_worse_in_a_row = 2;
 
 constexpr TubeSolver::Schedule wide{
     .first_smoothing = 0.5, .factor = 0.1, .last_smoothing = 1e-3, .most_steps = 1000};
@@ -81,7 +84,7 @@ class GridSearch {
     }
 
     Result<GridChoice> run() {
-        if (auto looked = is_noise() ? rank_all_columns() : look_at_columns(); !looked) {
+        if (auto looked = is_noise() ? rank_columns() : look_at_columns(); !looked) {
             return std::unexpected(looked.error());
         }
         for (const SigmaCandidate& candidate : waiting_) {
@@ -99,19 +102,23 @@ class GridSearch {
     }
 
     /// Where all points of the grid lie within a factor of two, a rough ranking by all folds costs less than
-    /// one fold to the end.
-    Result<void> rank_all_columns() {
-        double limit_mse = std::numeric_limits<double>::infinity();
-        for (std::size_t sigma = columns_.size(); sigma-- > 0;) {
-            auto found = columns_[sigma].rough().rank_by_all_folds(noise_rmse(), limit_mse, cancelled_);
-            if (!found) return std::unexpected(found.error());
-            for (const SigmaCandidate& candidate : *found) {
-                limit_mse = std::min(limit_mse, rough_margin * rough_margin * candidate.rough_mean_mse);
-            }
-            std::ranges::move(*found, std::back_inserter(waiting_));
+    /// one fold to the end. From wide kernels to narrow ones, until two in a row are worse and ever more so.
+    Result<void> rank_columns() {
+        double least_mse = std::numeric_limits<double>::infinity();
+        double of_wider = least_mse;
+        int worse_in_a_row = 0;
+        for (std::size_t sigma = columns_.size(); sigma-- > 0 && worse_in_a_row < most_worse_in_a_row;) {
+            auto ranking = columns_[sigma].rough().rank_by_all_folds(noise_rmse(), least_mse, cancelled_);
+            if (!ranking) return std::unexpected(ranking.error());
+            std::ranges::move(ranking->candidates, std::back_inserter(waiting_));
+            const double of_this = ranking->least_mean_mse;
+            least_mse = std::min(least_mse, of_this);
+            const bool is_worse = of_this > worse_column * worse_column * least_mse && of_this > of_wider;
+            worse_in_a_row = is_worse ? worse_in_a_row + 1 : 0;
+            of_wider = of_this;
         }
-        std::erase_if(waiting_, [limit_mse](const SigmaCandidate& candidate) {
-            return candidate.rough_mean_mse > limit_mse;
+        std::erase_if(waiting_, [least_mse](const SigmaCandidate& candidate) {
+            return candidate.rough_mean_mse > rough_margin * rough_margin * least_mse;
         });
         sort_waiting(&SigmaCandidate::rough_mean_mse);
         return {};

@@ -18,6 +18,7 @@ constexpr double rough_tolerance_factor = 100.0;
 constexpr double rough_truncation_share = 0.3;
 constexpr std::array first_smoothings{0.03, 0.003};
 constexpr double next_folds_smoothing = 0.01;
+constexpr int most_lost_in_a_row = 3;
 
 /// A tenth of the error to beat, as far as that is known.
 double rough_smoothing(double best_mean_mse) {
@@ -90,61 +91,62 @@ Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(double best_
     return candidates;
 }
 
-Result<std::vector<SigmaCandidate>> RoughColumn::rank_by_all_folds(double noise_rmse, double limit_mse,
-                                                                   const Cancelled& cancelled) {
+Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double least_mse,
+                                                    const Cancelled& cancelled) {
     const double finest = rough_tolerance_factor * feature_tolerance(sigma_);
     const double smoothing = rough_smoothing(noise_rmse * noise_rmse);
     KernelFactorisation factorisation(problem_, sigma_, stride_);
     double tolerance = std::numeric_limits<double>::infinity();
-    SigmaCandidate candidate;
-    candidate.sigma_index = sigma_index_;
-    std::vector<SigmaCandidate> candidates;
-    for (std::size_t k = 0; k < options_.C_grid.size(); ++k) {
+    // At most C a row; afterwards none grows by more than C does.
+    double largest_sum = options_.C_grid.front() * static_cast<double>(problem_.rows());
+    SigmaCandidate fit;
+    fit.sigma_index = sigma_index_;
+    RoughRanking ranking{.candidates = {}, .least_mean_mse = std::numeric_limits<double>::infinity()};
+    int lost_in_a_row = 0;
+    for (std::size_t k = 0; k < options_.C_grid.size() && lost_in_a_row < most_lost_in_a_row; ++k) {
         if (cancelled()) return sweep_cancelled();
-        const double C = options_.C_grid[k] * static_cast<double>(stride_);
-        // Held back by C or not, no coefficient grows by more than C does.
-        const double largest_sum =
-            k == 0 ? options_.C_grid[k] * static_cast<double>(problem_.rows())
-                   : candidate.coefficient_sum * options_.C_grid[k] / options_.C_grid[k - 1];
-        const double wanted = truncation(rough_truncation_share, noise_rmse, largest_sum, finest);
-        if (wanted < tolerance) {
-            tolerance = wanted;
+        const double needed = truncation(rough_truncation_share, noise_rmse, largest_sum, finest);
+        if (needed < tolerance) {
+            tolerance = needed;
             fitted_ = std::make_unique<FoldsOnFeatures>(factorisation.features(tolerance), folds_, targets_,
                                                         options_.epsilon);
         }
-        HeldOutFold& first = (*fitted_)[0];
-        first.start(C, k == 0 ? first.solver().cold_start()
-                              : padded(candidate.rough_state, fitted_->kernel().by_row.rows()));
-        const double before = candidate.rough_rmse;
-        candidate.C_index = k;
-        candidate.rough_rmse = fit_roughly(first, smoothing).rmse;
-        candidate.rough_state = first.solver().state();
-        candidate.coefficient_sum = first.solver().coefficients().lpNorm<1>();
-        candidate.rough_mean_mse = mean_of_all_folds(candidate, smoothing, limit_mse);
-        if (candidate.rough_mean_mse <= limit_mse) {
-            limit_mse = std::min(limit_mse, rough_margin * rough_margin * candidate.rough_mean_mse);
-            candidates.push_back(candidate);
+        if (k == 0) fit.rough_state = (*fitted_)[0].solver().cold_start();
+        const double before = fit.rough_rmse;
+        const double limit_mse = rough_margin * rough_margin * least_mse;
+        fit.C_index = k;
+        fit_all_folds(fit, smoothing, limit_mse);
+        const bool lost = fit.rough_mean_mse > limit_mse;
+        const bool grows = k > 0 && fit.rough_rmse > before;
+        if (!lost) ranking.candidates.push_back(fit);
+        lost_in_a_row = lost && grows ? lost_in_a_row + 1 : 0;
+        ranking.least_mean_mse = std::min(ranking.least_mean_mse, fit.rough_mean_mse);
+        least_mse = std::min(least_mse, fit.rough_mean_mse);
+        if (k + 1 < options_.C_grid.size()) {
+            largest_sum = fit.coefficient_sum * options_.C_grid[k + 1] / options_.C_grid[k];
         }
-        if (k > 0 && candidate.rough_rmse > before &&
-            candidate.rough_rmse > hopeless_rmse(limit_mse, folds_.size()))
-            break;
     }
-    return candidates;
+    return ranking;
 }
 
-/// Every fold only adds to the mean.
-double RoughColumn::mean_of_all_folds(SigmaCandidate& candidate, double smoothing, double limit_mse) {
-    const double C = options_.C_grid[candidate.C_index] * static_cast<double>(stride_);
+/// Goes on from fit.rough_state. Every fold only adds to the mean: beyond the limit it is left as it is.
+void RoughColumn::fit_all_folds(SigmaCandidate& fit, double smoothing, double limit_mse) {
+    const double C = options_.C_grid[fit.C_index] * static_cast<double>(stride_);
+    HeldOutFold& first = (*fitted_)[0];
+    first.start(C, padded(fit.rough_state, fitted_->kernel().by_row.rows()));
+    fit.rough_rmse = fit_roughly(first, smoothing).rmse;
+    fit.rough_state = first.solver().state();
+    fit.coefficient_sum = first.solver().coefficients().lpNorm<1>();
     const auto count = static_cast<double>(folds_.size());
-    double sum = candidate.rough_rmse * candidate.rough_rmse;
+    double sum = fit.rough_rmse * fit.rough_rmse;
     for (std::size_t f = 1; f < folds_.size() && sum <= limit_mse * count; ++f) {
         HeldOutFold& fold = (*fitted_)[f];
-        fold.start(C, candidate.rough_state);
+        fold.start(C, fit.rough_state);
         static_cast<void>(fold.rmse_at(next_folds_smoothing));
         const double rmse = fold.rmse_at(smoothing);
         sum += rmse * rmse;
     }
-    return sum / count;
+    fit.rough_mean_mse = sum / count;
 }
 
 TubeSolver::State RoughColumn::on(const KernelFeatures& kernel, const TubeSolver::State& rough) const {

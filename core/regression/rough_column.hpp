@@ -26,9 +26,15 @@ struct SigmaCandidate {
     TubeSolver::State rough_state;
 };
 
+/// What rank_by_all_folds() found at one sigma.
+struct RoughRanking {
+    std::vector<SigmaCandidate> candidates;
+    double least_mean_mse = 0.0;  ///< of all C looked at, candidates or not
+};
+
 /// On windows of noise the point that wins on all rows is among those whose rough error is at most this much
 /// larger than the least. Measured (README.md): up to 1.06.
-constexpr double rough_margin = 1.15;
+constexpr double rough_margin = 1.1;
 
 /// Where on one sigma's column of the grid to look: fits on every few rows, C made up for them, and not to
 /// the last digit. The arguments of the constructor must outlive it; one object a thread.
@@ -44,15 +50,15 @@ class RoughColumn {
                                                            const Cancelled& cancelled);
 
     /// All folds, from the smallest C up, for windows of noise: `noise_rmse` is about what no error falls
-    /// below. A candidate whose mean is above `limit_mse` is left out. Error: stop when cancelled.
-    Result<std::vector<SigmaCandidate>> rank_by_all_folds(double noise_rmse, double limit_mse,
-                                                          const Cancelled& cancelled);
+    /// below. Whose mean is beyond the margin from `least_mse` is no candidate; after three such in a row,
+    /// the error growing, larger C are left out. Error: stop when cancelled.
+    Result<RoughRanking> rank_by_all_folds(double noise_rmse, double least_mse, const Cancelled& cancelled);
 
     /// The same function on other features, which must hold the rows of these.
     TubeSolver::State on(const KernelFeatures& kernel, const TubeSolver::State& rough) const;
 
   private:
-    double mean_of_all_folds(SigmaCandidate& candidate, double smoothing, double limit_mse);
+    void fit_all_folds(SigmaCandidate& candidate, double smoothing, double limit_mse);
 
     const LagProblem& problem_;
     std::size_t sigma_index_;
