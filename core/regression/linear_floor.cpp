@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "regression/panels.hpp"
 
@@ -41,6 +42,12 @@ std::vector<double> linear_floor(const LagProblem& problem, const std::vector<Fo
     floor.reserve(folds.size());
     for (const Fold& fold : folds) floor.push_back(floor_on(problem, fold.held_out_rows));
     return floor;
+}
+
+double linear_rmse(const LagProblem& problem) {
+    std::vector<std::size_t> rows(problem.rows());
+    std::iota(rows.begin(), rows.end(), std::size_t{0});
+    return floor_on(problem, rows);
 }
 
 }  // namespace thermbal

@@ -12,4 +12,7 @@ namespace thermbal {
 /// rounding hides it.
 std::vector<double> linear_floor(const LagProblem& problem, const std::vector<Fold>& folds);
 
+/// The same over all rows at once.
+double linear_rmse(const LagProblem& problem);
+
 }  // namespace thermbal

@@ -29,7 +29,7 @@ constexpr std::size_t most_kept_numbers = 500'000;  ///< 4 MB
 /// (README.md): never below 0.89.
 constexpr double below_linear = 0.8;
 
-/// A window whose folds no linear predictor follows to so many epsilons, at its own rows, is noise.
+/// A window that no linear predictor follows to so many epsilons is noise.
 constexpr double noise_in_epsilons = 3.0;
 /// A column is worse when its least rough error is so much above the least of all.
 constexpr double worse_column = 1.03;
@@ -76,7 +76,8 @@ class GridSearch {
           cancelled_(cancelled),
           targets_(all_targets(problem)),
           folds_(make_folds(problem.rows(), options.folds, options.fold_kind, options.fold_seed)),
-          least_rmse_(linear_floor(problem, folds_)) {
+          least_rmse_(linear_floor(problem, folds_)),
+          noise_rmse_(below_linear * linear_rmse(problem)) {
         for (double& rmse : least_rmse_) rmse *= below_linear;
         for (std::size_t sigma = 0; sigma < options.sigma_grid.size(); ++sigma) {
             columns_.emplace_back(problem, sigma, folds_, options, targets_);
@@ -94,12 +95,7 @@ class GridSearch {
     }
 
   private:
-    bool is_noise() const { return noise_rmse() > noise_in_epsilons * options_.epsilon; }
-    double noise_rmse() const {
-        double sum = 0.0;
-        for (const double rmse : least_rmse_) sum += rmse * rmse;
-        return std::sqrt(sum / static_cast<double>(least_rmse_.size()));
-    }
+    bool is_noise() const { return noise_rmse_ > noise_in_epsilons * options_.epsilon; }
 
     /// Where all points of the grid lie within a factor of two, a rough ranking by all folds costs less than
     /// one fold to the end. From wide kernels to narrow ones, until two in a row are worse and ever more so.
@@ -108,12 +104,14 @@ class GridSearch {
         double of_wider = least_mse;
         int worse_in_a_row = 0;
         for (std::size_t sigma = columns_.size(); sigma-- > 0 && worse_in_a_row < most_worse_in_a_row;) {
-            auto ranking = columns_[sigma].rough().rank_by_all_folds(noise_rmse(), least_mse, cancelled_);
+            auto ranking = columns_[sigma].rough().rank_by_all_folds(noise_rmse_, least_mse, cancelled_);
             if (!ranking) return std::unexpected(ranking.error());
+            const bool no_candidate = ranking->candidates.empty();
             std::ranges::move(ranking->candidates, std::back_inserter(waiting_));
             const double of_this = ranking->least_mean_mse;
             least_mse = std::min(least_mse, of_this);
-            const bool is_worse = of_this > worse_column * worse_column * least_mse && of_this > of_wider;
+            const bool grows = of_this > of_wider && of_this > worse_column * worse_column * least_mse;
+            const bool is_worse = grows || no_candidate;
             worse_in_a_row = is_worse ? worse_in_a_row + 1 : 0;
             of_wider = of_this;
         }
@@ -175,12 +173,13 @@ class GridSearch {
         return {};
     }
 
-    /// Before anything is to be beaten: the first fold alone makes so much of the mean.
+    /// Noise alone makes many features, and forgives few. Before anything is to be beaten: the first fold
+    /// alone makes so much of the mean.
     RaceTerms terms_against(const SigmaCandidate& candidate) const {
         const double of_first = candidate.rough_rmse / std::sqrt(static_cast<double>(folds_.size()));
         return {.bound = best_mean_mse_,
                 .least_rmse = least_rmse_,
-                .small_rmse = std::min(std::sqrt(best_mean_mse_), of_first)};
+                .small_rmse = is_noise() ? std::min(std::sqrt(best_mean_mse_), of_first) : 0.0};
     }
 
     /// Rough windows have kernels of a rank in the hundreds: all columns together would take a gigabyte.
@@ -206,6 +205,7 @@ class GridSearch {
     VectorXd targets_;
     std::vector<Fold> folds_;
     std::vector<double> least_rmse_;  ///< fold by fold
+    double noise_rmse_;               ///< of the window: no error falls much below it
     std::vector<SigmaColumn> columns_;
     std::vector<SigmaCandidate> waiting_;
     std::vector<double> least_by_column_;  ///< from the widest kernel on

@@ -23,6 +23,11 @@ double lowest_rmse_across_folds(double rmse) {
     return rmse - 3.0 * across_folds_smoothing;
 }
 
+/// Features more precise than need be cost less than new ones, if they are not many more.
+bool is_worth_keeping(const KernelFeatures& kernel, double tolerance) {
+    return 2 * kernel.pivots.size() <= 3 * kernel.rank_at(tolerance) + 16;
+}
+
 /// A candidate's errors fold by fold as they become known.
 class Race {
   public:
@@ -105,7 +110,7 @@ void SigmaColumn::release() {
 }
 
 void SigmaColumn::truncate_at(double tolerance) {
-    if (fitted_ && tolerance_ == tolerance) return;
+    if (fitted_ && tolerance_ <= tolerance && is_worth_keeping(fitted_->kernel(), tolerance)) return;
     if (!factorisation_) factorisation_.emplace(problem_, sigma_);
     fitted_.reset();
     fitted_ = std::make_unique<FoldsOnFeatures>(factorisation_->features(tolerance), folds_, targets_,
