@@ -115,8 +115,9 @@ class GridSearch {
             worse_in_a_row = is_worse ? worse_in_a_row + 1 : 0;
             of_wider = of_this;
         }
-        std::erase_if(waiting_, [least_mse](const SigmaCandidate& candidate) {
-            return candidate.rough_mean_mse > rough_margin * rough_margin * least_mse;
+        const double margin = columns_.front().rough().margin();
+        std::erase_if(waiting_, [margin, least_mse](const SigmaCandidate& candidate) {
+            return candidate.rough_mean_mse > margin * margin * least_mse;
         });
         sort_waiting(&SigmaCandidate::rough_mean_mse);
         return {};

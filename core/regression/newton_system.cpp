@@ -120,7 +120,8 @@ void FeatureGram::add(const MatrixXd& by_row, const std::vector<Index>& rows, do
 
 const PanelMatrix& RowGram::over(const MatrixXd& by_row, const std::vector<Index>& bending) {
     find_kept_and_fresh(bending);
-    gather_rows(by_row, bending, all_by_row_);
+    if (fresh_.empty() && kept_.size() == rows_.size()) return products_;
+    if (!fresh_.empty()) gather_rows(by_row, bending, all_by_row_);
     if (2 * fresh_.size() > bending.size()) {
         products_.set_zero_lower(bending.size());
         add_products(all_by_row_, 1.0, products_);
@@ -152,16 +153,17 @@ void RowGram::bring_up_to_date(const MatrixXd& by_row, const std::vector<Index>&
             new_products_.at(kept_[r].first, kept_[c].first) = products_.at(kept_[r].second, kept_[c].second);
         }
     }
+    std::swap(products_, new_products_);
+    if (fresh_.empty()) return;
     fresh_rows_.clear();
     for (const std::size_t k : fresh_) fresh_rows_.push_back(bending[k]);
     gather_rows(by_row, fresh_rows_, fresh_by_row_);
     products(all_by_row_, fresh_by_row_, of_fresh_);
     for (std::size_t f = 0; f < fresh_.size(); ++f) {
         for (std::size_t i = 0; i < bending.size(); ++i) {
-            new_products_.at(std::max(i, fresh_[f]), std::min(i, fresh_[f])) = of_fresh_.at(i, f);
+            products_.at(std::max(i, fresh_[f]), std::min(i, fresh_[f])) = of_fresh_.at(i, f);
         }
     }
-    std::swap(products_, new_products_);
 }
 
 void NewtonSystem::solve(const std::vector<Index>& bending, double curvature, const VectorXd& gradient,

@@ -21,8 +21,8 @@ constexpr double next_folds_smoothing = 0.01;
 constexpr int most_lost_in_a_row = 3;
 
 /// A tenth of the error to beat, as far as that is known.
-double rough_smoothing(double best_mean_mse) {
-    return std::clamp(0.1 * std::sqrt(best_mean_mse), 3e-4, 3e-3);
+double rough_smoothing(double rmse, double widest) {
+    return std::clamp(0.1 * rmse, 3e-4, widest);
 }
 
 /// The first fold at the solver's C, smoothing by smoothing.
@@ -74,7 +74,8 @@ Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(double best_
             continue;
         }
         first.start(C, state);
-        const RoughFit fit = fit_roughly(first, rough_smoothing(best_mean_mse));
+        const RoughFit fit =
+            fit_roughly(first, rough_smoothing(std::sqrt(best_mean_mse), first_smoothings[1]));
         state = first.solver().state();
         const VectorXd& coefficients = first.solver().coefficients();
         largest_coefficient = coefficients.lpNorm<Eigen::Infinity>();
@@ -94,7 +95,7 @@ Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(double best_
 Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double least_mse,
                                                     const Cancelled& cancelled) {
     const double finest = rough_tolerance_factor * feature_tolerance(sigma_);
-    const double smoothing = rough_smoothing(noise_rmse * noise_rmse);
+    const double smoothing = rough_smoothing(noise_rmse, next_folds_smoothing);
     KernelFactorisation factorisation(problem_, sigma_, stride_);
     double tolerance = std::numeric_limits<double>::infinity();
     // At most C a row; afterwards none grows by more than C does.
@@ -113,7 +114,7 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
         }
         if (k == 0) fit.rough_state = (*fitted_)[0].solver().cold_start();
         const double before = fit.rough_rmse;
-        const double limit_mse = rough_margin * rough_margin * least_mse;
+        const double limit_mse = margin() * margin() * least_mse;
         fit.C_index = k;
         fit_all_folds(fit, smoothing, limit_mse);
         const bool lost = fit.rough_mean_mse > limit_mse;
@@ -142,7 +143,7 @@ void RoughColumn::fit_all_folds(SigmaCandidate& fit, double smoothing, double li
     for (std::size_t f = 1; f < folds_.size() && sum <= limit_mse * count; ++f) {
         HeldOutFold& fold = (*fitted_)[f];
         fold.start(C, fit.rough_state);
-        static_cast<void>(fold.rmse_at(next_folds_smoothing));
+        if (smoothing < next_folds_smoothing) static_cast<void>(fold.rmse_at(next_folds_smoothing));
         const double rmse = fold.rmse_at(smoothing);
         sum += rmse * rmse;
     }

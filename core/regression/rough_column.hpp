@@ -32,10 +32,6 @@ struct RoughRanking {
     double least_mean_mse = 0.0;  ///< of all C looked at, candidates or not
 };
 
-/// On windows of noise the point that wins on all rows is among those whose rough error is at most this much
-/// larger than the least. Measured (README.md): up to 1.06.
-constexpr double rough_margin = 1.1;
-
 /// Where on one sigma's column of the grid to look: fits on every few rows, C made up for them, and not to
 /// the last digit. The arguments of the constructor must outlive it; one object a thread.
 class RoughColumn {
@@ -53,6 +49,10 @@ class RoughColumn {
     /// below. Whose mean is beyond the margin from `least_mse` is no candidate; after three such in a row,
     /// the error growing, larger C are left out. Error: stop when cancelled.
     Result<RoughRanking> rank_by_all_folds(double noise_rmse, double least_mse, const Cancelled& cancelled);
+
+    /// On windows of noise the point that wins on all rows is among those whose rough error is at most this
+    /// much larger than the least. Measured (README.md): up to 1.06, and 1.005 where no row is left out.
+    double margin() const { return stride_ == 1 ? 1.04 : 1.1; }
 
     /// The same function on other features, which must hold the rows of these.
     TubeSolver::State on(const KernelFeatures& kernel, const TubeSolver::State& rough) const;
