@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <iterator>
 #include <numeric>
 #include <span>
 
@@ -24,9 +23,25 @@ constexpr std::size_t height = PanelMatrix::height;
 /// So many rows' features at a time: they stay in the cache while they are multiplied.
 constexpr std::size_t gathered_at_once = 64;
 
-void difference(const std::vector<Index>& of, const std::vector<Index>& without, std::vector<Index>& out) {
-    out.clear();
-    std::ranges::set_difference(of, without, std::back_inserter(out));
+/// What is in one of two ascending lists alone.
+void differences(const std::vector<Index>& a, const std::vector<Index>& b, std::vector<Index>& in_a_alone,
+                 std::vector<Index>& in_b_alone) {
+    in_a_alone.clear();
+    in_b_alone.clear();
+    auto next_a = a.begin();
+    auto next_b = b.begin();
+    while (next_a != a.end() && next_b != b.end()) {
+        if (*next_a == *next_b) {
+            ++next_a;
+            ++next_b;
+        } else if (*next_a < *next_b) {
+            in_a_alone.push_back(*next_a++);
+        } else {
+            in_b_alone.push_back(*next_b++);
+        }
+    }
+    in_a_alone.insert(in_a_alone.end(), next_a, a.end());
+    in_b_alone.insert(in_b_alone.end(), next_b, b.end());
 }
 
 /// Features in panels of eight features, one column a row.
@@ -73,8 +88,7 @@ void assemble(const PanelMatrix& gram, double scale, double weight, const Vector
 
 const PanelMatrix& FeatureGram::over(const MatrixXd& by_row, const std::vector<Index>& bending) {
     const auto all = static_cast<std::size_t>(by_row.cols());
-    difference(bending, rows_, entering_);
-    difference(rows_, bending, leaving_);
+    differences(bending, rows_, entering_, leaving_);
     const std::size_t changed = entering_.size() + leaving_.size();
     const std::size_t from_anew = std::min(bending.size(), all - bending.size());
     if (changed > from_anew || changes_ == most_changes || sum_.numbers() == 0) {
@@ -83,8 +97,7 @@ const PanelMatrix& FeatureGram::over(const MatrixXd& by_row, const std::vector<I
         } else {
             start_from_nothing(static_cast<std::size_t>(by_row.rows()));
         }
-        difference(bending, rows_, entering_);
-        difference(rows_, bending, leaving_);
+        differences(bending, rows_, entering_, leaving_);
         changes_ = 0;
     }
     add(by_row, entering_, 1.0, sum_);
@@ -178,14 +191,15 @@ void NewtonSystem::solve(const std::vector<Index>& bending, double curvature, co
 void NewtonSystem::in_feature_space(const std::vector<Index>& bending, double curvature,
                                     const VectorXd& gradient, double bias_gradient, Direction& direction) {
     const auto rows = static_cast<double>(bending.size());
-    VectorXd mean = VectorXd::Zero(by_row_.rows());
-    vector_loops::add_rows(by_row_.data(), static_cast<std::size_t>(by_row_.rows()), bending,
-                           std::vector<double>(bending.size(), 1.0 / rows), mean.data());
-    assemble(feature_gram_.over(by_row_, bending), curvature, curvature * rows, mean, system_);
+    mean_.setZero(by_row_.rows());
+    shares_.assign(bending.size(), 1.0 / rows);
+    vector_loops::add_rows(by_row_.data(), static_cast<std::size_t>(by_row_.rows()), bending, shares_,
+                           mean_.data());
+    assemble(feature_gram_.over(by_row_, bending), curvature, curvature * rows, mean_, system_);
     factor_.factor(system_);
-    direction.weights = mean * bias_gradient - gradient;
+    direction.weights = mean_ * bias_gradient - gradient;
     factor_.solve(direction.weights.data());
-    direction.bias = -bias_gradient / (curvature * rows) - mean.dot(direction.weights);
+    direction.bias = -bias_gradient / (curvature * rows) - mean_.dot(direction.weights);
 }
 
 void NewtonSystem::in_row_space(const std::vector<Index>& bending, double curvature, const VectorXd& gradient,
@@ -195,17 +209,17 @@ void NewtonSystem::in_row_space(const std::vector<Index>& bending, double curvat
     system_ = row_gram_.over(by_row_, bending);
     for (std::size_t i = 0; i < system_.padded_rows(); ++i) system_.at(i, i) += 1.0 / curvature;
     factor_.factor(system_);
-    VectorXd without_bias = VectorXd::Zero(static_cast<Index>(system_.padded_rows()));
-    vector_loops::multiply_rows(by_row_.data(), rank, bending, gradient.data(), 0.0, without_bias.data());
-    without_bias *= -1.0;
-    factor_.solve(without_bias.data());
-    VectorXd of_bias = VectorXd::Zero(without_bias.size());
-    of_bias.head(rows).setOnes();
-    factor_.solve(of_bias.data());
-    direction.bias = (-bias_gradient - without_bias.sum()) / of_bias.sum();
-    const VectorXd factors = -without_bias - direction.bias * of_bias;
+    without_bias_.setZero(static_cast<Index>(system_.padded_rows()));
+    vector_loops::multiply_rows(by_row_.data(), rank, bending, gradient.data(), 0.0, without_bias_.data());
+    without_bias_ *= -1.0;
+    factor_.solve(without_bias_.data());
+    of_bias_.setZero(without_bias_.size());
+    of_bias_.head(rows).setOnes();
+    factor_.solve(of_bias_.data());
+    direction.bias = (-bias_gradient - without_bias_.sum()) / of_bias_.sum();
+    without_bias_ = -without_bias_ - direction.bias * of_bias_;
     direction.weights = -gradient;
-    vector_loops::add_rows(by_row_.data(), rank, bending, {factors.data(), bending.size()},
+    vector_loops::add_rows(by_row_.data(), rank, bending, {without_bias_.data(), bending.size()},
                            direction.weights.data());
 }
 

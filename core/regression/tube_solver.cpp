@@ -88,19 +88,26 @@ bool TubeSolver::descend(double smoothing, double still, int most_steps) {
 void TubeSolver::take_slopes() {
     vector_loops::loss_slopes(residuals_.data(), static_cast<std::size_t>(residuals_.size()), tube_,
                               new_slopes_.data());
-    bending_.clear();
-    changed_.clear();
-    slope_changes_.clear();
-    for (Index i = 0; i < slopes_.size(); ++i) {
-        const Index row = rows_[static_cast<std::size_t>(i)];
-        const double slope = new_slopes_(i);
-        const double size = std::abs(slope);
-        if (size > 0.0 && size < tube_.C) bending_.push_back(row);
-        if (slope == slopes_(i)) continue;
-        changed_.push_back(row);
-        slope_changes_.push_back(slope - slopes_(i));
-        slopes_(i) = slope;
+    // Without a branch: which rows bend or change follows no pattern.
+    const std::size_t count = rows_.size();
+    bending_.resize(count);
+    changed_.resize(count);
+    slope_changes_.resize(count);
+    std::size_t bends = 0;
+    std::size_t changes = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        double& slope = slopes_.data()[i];
+        const double new_slope = new_slopes_.data()[i];
+        const double size = std::abs(new_slope);
+        bending_[bends] = changed_[changes] = rows_[i];
+        slope_changes_[changes] = new_slope - slope;
+        bends += static_cast<std::size_t>((size > 0.0) & (size < tube_.C));
+        changes += static_cast<std::size_t>(new_slope != slope);
+        slope = new_slope;
     }
+    bending_.resize(bends);
+    changed_.resize(changes);
+    slope_changes_.resize(changes);
     vector_loops::add_rows(system_->by_row().data(), static_cast<std::size_t>(slope_sum_.size()), changed_,
                            slope_changes_, slope_sum_.data());
 }

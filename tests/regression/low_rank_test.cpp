@@ -112,6 +112,20 @@ TEST(KernelFeatures, MultiplyToTheKernel) {
     }
 }
 
+TEST(KernelFactorisation, GoesOnToWhereItWouldHaveComeAtOnce) {
+    const auto problem = *make_lag_problem(testing::filtered_warm_up(testing::two_constants, 200, 3), 7, 0.0);
+    KernelFactorisation factorisation(problem, 2.0);
+    const auto first = factorisation.features(1e-3);
+    const auto further = factorisation.features(1e-8);
+    const auto first_again = factorisation.features(1e-3);
+    const auto at_once = kernel_features(problem, 2.0, 1e-8);
+    EXPECT_LT(first.pivots.size(), further.pivots.size());
+    EXPECT_EQ(further.by_row, at_once.by_row);
+    EXPECT_EQ(further.pivots, at_once.pivots);
+    EXPECT_EQ(first_again.by_row, first.by_row);
+    EXPECT_EQ(first.pivots.size(), further.rank_at(1e-3));
+}
+
 TEST(KernelFeatures, CarryAFunctionToOtherFeatures) {
     const auto problem = *make_lag_problem(testing::filtered_warm_up(testing::two_constants, 200, 2), 5, 0.0);
     const auto rough = kernel_features(problem, 4.0, 1e-8, 4);
@@ -285,6 +299,28 @@ TEST(LowRankSweep, LosesNothingOnNoiseAloneAndOnCycles) {
         const auto errors = cross_validate_grid(problem, options, never_cancelled);
         ASSERT_TRUE(chosen && errors);
         EXPECT_NEAR(std::sqrt(chosen->cv_mse_unit), std::sqrt(*std::ranges::min_element(*errors)), 1e-4);
+    }
+}
+
+/// 0.5 C at 0.1 C: steps that no filter removes. All points lie close together, and every second row is left
+/// out of the ranking.
+TEST(LowRankSweep, ChoosesAsTheWholeGridWhereAChannelHardlyRises) {
+    SweepOptions options;
+    options.sigma_grid = {4.0, 8.0, 32.0};
+    auto window = testing::warm_up(testing::two_constants, 840);
+    for (std::size_t k = 0; k < window.size(); ++k) {
+        const double wobble_C = 0.03 * std::sin(0.41 * static_cast<double>(k));
+        window[k] = std::round((18.0 + 0.06 * (window[k] - 18.0) + wobble_C) * 10.0) / 10.0;
+    }
+    const auto filtered = denoise(window, {})->values_C;
+    for (const std::size_t lags : {2U, 11U}) {
+        const auto problem = *make_lag_problem(filtered, lags, 0.0);
+        const auto chosen = search_grid(problem, options, never_cancelled);
+        const auto errors = cross_validate_grid(problem, options, never_cancelled);
+        ASSERT_TRUE(chosen && errors);
+        const double lowest = std::sqrt(*std::ranges::min_element(*errors));
+        EXPECT_GT(lowest, 0.01) << "not the kind of window that is meant";
+        EXPECT_NEAR(std::sqrt(chosen->cv_mse_unit), lowest, 2e-3 * lowest) << "n " << lags;
     }
 }
 

@@ -84,6 +84,10 @@ class NewtonSystem {
     RowGram row_gram_;
     PanelMatrix system_;
     PanelCholesky factor_;
+    // Kept for their memory alone.
+    Eigen::VectorXd mean_;
+    std::vector<double> shares_;
+    Eigen::VectorXd without_bias_, of_bias_;
 };
 
 }  // namespace thermbal
