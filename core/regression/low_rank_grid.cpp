@@ -41,6 +41,16 @@ constexpr TubeSolver::Schedule exact{
     .first_smoothing = 1e-3, .factor = 0.1, .last_smoothing = 1e-8, .most_steps = 1000};
 constexpr double wide_tolerance_factor = 1000.0;
 constexpr double exact_tolerance_factor = 0.01;
+/// By more than this no prediction of the last fit is moved by the truncation of its kernel. A free run makes
+/// some hundred times that of it.
+constexpr double negligible_C = 1e-5;
+
+/// The coefficients are at most C a row.
+double exact_tolerance(const LagProblem& problem, double C, double sigma) {
+    const double largest_sum = C * static_cast<double>(problem.rows());
+    return std::clamp(negligible_C / (problem.scale.range_C * largest_sum),
+                      exact_tolerance_factor * feature_tolerance(sigma), 1e-6);
+}
 
 VectorXd all_targets(const LagProblem& problem) {
     return Eigen::Map<const VectorXd>(problem.targets().data(), static_cast<Eigen::Index>(problem.rows()));
@@ -246,8 +256,7 @@ Result<std::vector<double>> cross_validate_low_rank(const LagProblem& problem, c
 
 Result<SvrModel> fit_model_low_rank(const LagProblem& problem, double C, double sigma,
                                     const SweepOptions& options) {
-    const KernelFeatures kernel =
-        kernel_features(problem, sigma, exact_tolerance_factor * feature_tolerance(sigma));
+    const KernelFeatures kernel = kernel_features(problem, sigma, exact_tolerance(problem, C, sigma));
     const VectorXd targets = all_targets(problem);
     NewtonSystem system(kernel.by_row);
     TubeSolver solver(system, all_rows(targets), targets, options.epsilon);
