@@ -53,6 +53,8 @@ class FoldsOnFeatures {
     FoldsOnFeatures(const FoldsOnFeatures&) = delete;
 
     const KernelFeatures& kernel() const { return kernel_; }
+    /// The last use of this object.
+    KernelFeatures take_kernel() { return std::move(kernel_); }
     HeldOutFold& operator[](std::size_t f) {
         if (!fitted_[f]) fitted_[f].emplace(kernel_, system_, folds_[f], targets_, epsilon_);
         return *fitted_[f];

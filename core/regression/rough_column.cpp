@@ -89,6 +89,8 @@ Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(double best_
                               .rough_state = state});
         if (skip_hopeless && grows && fit.rmse > hopeless) break;
     }
+    kernel_ = fitted_->take_kernel();
+    fitted_.reset();
     return candidates;
 }
 
@@ -127,6 +129,8 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
             largest_sum = fit.coefficient_sum * options_.C_grid[k + 1] / options_.C_grid[k];
         }
     }
+    if (!ranking.candidates.empty()) kernel_ = fitted_->take_kernel();
+    fitted_.reset();
     return ranking;
 }
 
@@ -151,9 +155,8 @@ void RoughColumn::fit_all_folds(SigmaCandidate& fit, double smoothing, double li
 }
 
 TubeSolver::State RoughColumn::on(const KernelFeatures& kernel, const TubeSolver::State& rough) const {
-    const KernelFeatures& from = fitted_->kernel();
-    const TubeSolver::State all = padded(rough, from.by_row.rows());
-    return {weights_of(kernel, from.pivots, pivot_coefficients(from, all.weights)), all.bias};
+    const TubeSolver::State all = padded(rough, kernel_.by_row.rows());
+    return {weights_of(kernel, kernel_.pivots, pivot_coefficients(kernel_, all.weights)), all.bias};
 }
 
 }  // namespace thermbal

@@ -67,7 +67,8 @@ class RoughColumn {
     const SweepOptions& options_;
     const Eigen::VectorXd& targets_;
     std::size_t stride_;
-    std::unique_ptr<FoldsOnFeatures> fitted_;
+    std::unique_ptr<FoldsOnFeatures> fitted_;  ///< while one of the two is at work
+    KernelFeatures kernel_;                    ///< of the candidates, afterwards
 };
 
 }  // namespace thermbal
