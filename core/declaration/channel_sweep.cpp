@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "series/resolution.hpp"
 #include "series/sample.hpp"
 
 namespace thermbal {
@@ -39,6 +40,12 @@ Result<SvrPrediction> predict_at(const LagFit& fit, std::span<const double> filt
     return svr;
 }
 
+double rms_difference(std::span<const double> a, std::span<const double> b) {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < a.size(); ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
+    return a.empty() ? 0.0 : std::sqrt(sum / static_cast<double>(a.size()));
+}
+
 double last_sweep_length_s(const TestWindow& window, const FlowOptions& options) {
     const double shortest_s = options.guards.shortest_window_min * 60.0;
     const double length_s = window.end_s() - window.start_s;
@@ -58,11 +65,14 @@ TestWindow swept_window(const TestWindow& since, const FlowOptions& options) {
 Result<FilteredSamples> filtered_samples(std::span<const double> samples_C, const FlowOptions& options) {
     const auto marked = mark_outliers(samples_C, options.outliers);
     if (!marked) return std::unexpected(marked.error());
-    const auto filled = fill_short_gaps(marked->values_C, options.gaps);
+    const std::size_t begin = after_last_long_gap(marked->values_C, options.gaps);
+    const auto filled = fill_short_gaps(std::span(marked->values_C).subspan(begin), options.gaps);
     if (!filled) return std::unexpected(filled.error());
     auto filtered = denoise(filled->values_C, options.filter);
     if (!filtered) return std::unexpected(filtered.error());
-    return FilteredSamples{static_cast<std::size_t>(filled->first), std::move(filtered->values_C)};
+    const double rounding_C = smallest_step(samples_C) / std::sqrt(12.0);
+    const double noise_C = std::max(rounding_C, rms_difference(filled->values_C, filtered->values_C));
+    return FilteredSamples{begin + filled->first, std::move(filtered->values_C), begin > 0, noise_C};
 }
 
 Result<ChannelSweep> sweep_channel(std::span<const double> samples_C, double start_s, double period_s,
@@ -76,13 +86,15 @@ Result<ChannelSweep> sweep_channel(std::span<const double> samples_C, double sta
 
     ChannelSweep result;
     for (const LagFit& fit : swept->by_lag) result.rmse_by_n_C.push_back(fit.window_rmse_C);
-    result.minimum = find_minimum(result.rmse_by_n_C, options.criterion);
+    result.minimum = find_minimum(result.rmse_by_n_C, filtered->noise_C, options.criterion);
     if (result.minimum.n > 0) {
         const LagFit& fit = swept->by_lag[static_cast<std::size_t>(result.minimum.n) - 1];
         const double first_s = start_s + static_cast<double>(filtered->first) * period_s;
         auto svr = predict_at(fit, filtered_C, first_s, period_s, options.sweep);
         if (!svr) return std::unexpected(svr.error());
         result.svr = *svr;
+        // 95 % of the rise since the test began, which these samples have not seen.
+        if (filtered->after_gap) result.svr.equilibrium_time_min = no_value;
     }
     return result;
 }

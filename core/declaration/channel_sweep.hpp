@@ -9,12 +9,15 @@
 
 namespace thermbal {
 
-/// A channel as the regression sees it: outliers taken out, short gaps filled, denoised.
+/// A channel as the regression sees it: outliers taken out, short gaps filled, denoised. After a gap that is
+/// too long to be filled it begins anew: lags reach across no gap.
 struct FilteredSamples {
     std::size_t first = 0;  ///< sample of the channel that temperature_C begins with
     std::vector<double> temperature_C;
+    bool after_gap = false;
+    double noise_C = 0.0;  ///< of one reading: what the filter took out, at least what rounding leaves
 };
-/// Errors (refuse_input): the samples do not allow it (long gaps, too few).
+/// Errors (refuse_input): the samples do not allow it (none, too few).
 Result<FilteredSamples> filtered_samples(std::span<const double> samples_C, const FlowOptions& options);
 
 /// What of a regime's window the sweep sees: with SweepWhen::needed the longest of those that each are

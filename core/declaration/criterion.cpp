@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include <fmt/format.h>
@@ -27,10 +28,27 @@ double roughness(const std::vector<double>& y) {
     return bends.empty() ? 0.0 : sd_of_mad * median(bends) / std::sqrt(6.0);
 }
 
+bool at_the_floor(const RmseMinimum& found, const CriterionOptions& options) {
+    return found.rmse_C <= options.floor_in_noises * found.noise_C;
+}
+
+bool has_ended(const RmseMinimum& found, const CriterionOptions& options) {
+    return found.falling <= options.edge_fall || at_the_floor(found, options);
+}
+
+std::string end_of_curve(const RmseMinimum& found, std::size_t lags, const CriterionOptions& options) {
+    if (found.falling <= options.edge_fall) return "the curve has turned or levelled off";
+    if (at_the_floor(found, options)) return "the curve has come down to the noise of the readings";
+    return fmt::format("still falling at n = {} (by {:.2f}, allowed {:.2f} above {:.3f} C)", lags,
+                       found.falling, options.edge_fall, options.floor_in_noises * found.noise_C);
+}
+
 }  // namespace
 
-RmseMinimum find_minimum(std::span<const double> rmse_by_n_C, const CriterionOptions& options) {
+RmseMinimum find_minimum(std::span<const double> rmse_by_n_C, double noise_C,
+                         const CriterionOptions& options) {
     RmseMinimum found;
+    found.noise_C = noise_C;
     found.guard.name = "clear_minimum";
     std::vector<double> y;  // of the usable n, in their order
     std::vector<int> lags;
@@ -55,17 +73,14 @@ RmseMinimum find_minimum(std::span<const double> rmse_by_n_C, const CriterionOpt
     for (std::size_t i = 0; i < y.size() && lags[i] <= before_the_edge; ++i)
         lowest_before = std::min(lowest_before, y[i]);
     found.falling = lowest_before - y[lowest];
-    found.clear = found.n > 1 && found.falling <= options.edge_fall && found.depth >= options.min_depth &&
+    found.clear = found.n > 1 && has_ended(found, options) && found.depth >= options.min_depth &&
                   found.depth >= options.min_depth_in_scatters * found.scatter;
     found.guard.passed = found.clear;
     found.guard.figures = fmt::format(
         "RMSE {:.3f} C at n = {}, {:.2f} below the curve in ln (needed {:.2f} and {:.1f} x its scatter "
         "{:.2f}), {}",
         found.rmse_C, found.n, found.depth, options.min_depth, options.min_depth_in_scatters, found.scatter,
-        found.falling <= options.edge_fall
-            ? std::string("the curve has turned or levelled off")
-            : fmt::format("still falling at n = {} (by {:.2f}, allowed {:.2f})", rmse_by_n_C.size(),
-                          found.falling, options.edge_fall));
+        end_of_curve(found, rmse_by_n_C.size(), options));
     return found;
 }
 

@@ -109,4 +109,20 @@ Result<FilledWindow> fill_short_gaps(std::span<const double> temperature_C, cons
     return window;
 }
 
+std::size_t after_last_long_gap(std::span<const double> temperature_C, const GapOptions& options) {
+    std::size_t begin = 0;
+    std::size_t missing = 0;
+    bool any_good = false;
+    for (std::size_t k = 0; k < temperature_C.size(); ++k) {
+        if (!std::isfinite(temperature_C[k])) {
+            ++missing;
+            continue;
+        }
+        if (any_good && missing > options.longest_filled) begin = k;
+        missing = 0;
+        any_good = true;
+    }
+    return begin;
+}
+
 }  // namespace thermbal

@@ -8,6 +8,7 @@
 
 #include "base/median.hpp"
 #include "base/units.hpp"
+#include "series/resolution.hpp"
 
 namespace thermbal {
 
@@ -127,20 +128,6 @@ double integrated_autocorrelation(const Eigen::VectorXd& residual) {
 }
 
 }  // namespace
-
-double smallest_step(const std::vector<double>& values) {
-    std::vector<double> sorted;
-    for (const double value : values) {
-        if (!std::isnan(value)) sorted.push_back(value);
-    }
-    std::sort(sorted.begin(), sorted.end());
-    double step = 0.0;
-    for (std::size_t k = 1; k < sorted.size(); ++k) {
-        const double difference = sorted[k] - sorted[k - 1];
-        if (difference > 1e-6 && (step == 0.0 || difference < step)) step = difference;
-    }
-    return step;
-}
 
 BlockMeans block_means(const std::vector<double>& values, Eigen::Index rows, std::size_t scans_per_block) {
     BlockMeans blocks;

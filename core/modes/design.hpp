@@ -63,9 +63,6 @@ struct BlockMeans {
 
 BlockMeans block_means(const std::vector<double>& values, Eigen::Index rows, std::size_t scans_per_block);
 
-/// The smallest difference between two readings: the resolution as the data show it; 0 if all are equal.
-double smallest_step(const std::vector<double>& values);
-
 /// What one channel's samples say about the coefficients, in as few rows as carry information:
 /// rotated = reduced * coefficients + N(0, row_variance).
 struct ReducedChannel {

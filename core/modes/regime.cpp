@@ -10,6 +10,7 @@
 
 #include "base/units.hpp"
 #include "design.hpp"
+#include "series/resolution.hpp"
 
 namespace thermbal {
 

@@ -16,7 +16,7 @@ std::vector<double> curve(double (*rmse_C)(int)) {
 }
 
 TEST(Criterion, FindsTheMinimumOfAValley) {
-    const auto found = find_minimum(curve([](int n) { return 0.2 + 0.01 * std::pow(n - 20, 2); }), {});
+    const auto found = find_minimum(curve([](int n) { return 0.2 + 0.01 * std::pow(n - 20, 2); }), 0.2, {});
     EXPECT_EQ(found.n, 20);
     EXPECT_DOUBLE_EQ(found.rmse_C, 0.2);
     EXPECT_TRUE(found.clear);
@@ -28,41 +28,49 @@ TEST(Criterion, DepthAndScatterAreWhatTheirDefinitionsSay) {
     const auto found = find_minimum(curve([](int n) {
                                         return std::exp(n == 18 ? -1.0 : n % 2 == 0 ? 0.1 : -0.1);
                                     }),
-                                    {});
+                                    1.0, {});
     EXPECT_EQ(found.n, 18);
     EXPECT_NEAR(found.scatter, 1.4826 * 0.4 / std::sqrt(6.0), 1e-12);
     EXPECT_NEAR(found.depth, 1.0 + 0.1, 1e-12);  // the upper decile is one of the values at +0.1
 }
 
 TEST(Criterion, ACurveThatStillFallsHasNoMinimumYet) {
-    const auto found = find_minimum(curve([](int n) { return std::exp(-0.1 * n); }), {});
+    const auto found = find_minimum(curve([](int n) { return std::exp(-0.1 * n); }), 0.02, {});
     EXPECT_EQ(found.n, 35);
     EXPECT_NEAR(found.falling, 0.5, 1e-12);
     EXPECT_FALSE(found.clear);
 }
 
 TEST(Criterion, ACurveThatEndsInAFloorHasOne) {
-    const auto found = find_minimum(curve([](int n) { return 0.03 + 0.5 * std::exp(-0.4 * n); }), {});
+    const auto found = find_minimum(curve([](int n) { return 0.03 + 0.5 * std::exp(-0.4 * n); }), 0.03, {});
+    EXPECT_TRUE(found.clear) << found.guard.figures;
+}
+
+TEST(Criterion, BelowTheNoiseOfTheReadingsItNeedNotLevelOff) {
+    const auto falls = curve([](int n) { return std::exp(-0.1 * n); });  // to 0.0302
+    EXPECT_FALSE(find_minimum(falls, 0.0302 / 0.71, {}).clear);
+    const auto found = find_minimum(falls, 0.0302 / 0.69, {});
     EXPECT_TRUE(found.clear) << found.guard.figures;
 }
 
 TEST(Criterion, ARisingCurveHasNone) {
-    const auto found = find_minimum(curve([](int n) { return 0.1 * std::exp(0.05 * n); }), {});
+    const auto found = find_minimum(curve([](int n) { return 0.1 * std::exp(0.05 * n); }), 1.0, {});
     EXPECT_EQ(found.n, 1);
     EXPECT_FALSE(found.clear);
 }
 
 TEST(Criterion, NoiseAroundAConstantHasNone) {
-    const auto found = find_minimum(curve([](int n) { return std::exp(0.2 * std::sin(2.4 * n * n)); }), {});
+    const auto found =
+        find_minimum(curve([](int n) { return std::exp(0.2 * std::sin(2.4 * n * n)); }), 1.0, {});
     EXPECT_FALSE(found.clear) << found.guard.figures;
 }
 
 TEST(Criterion, DivergedFreeRunsCountAsWorstAndTooManyOfThemAreNoCurve) {
     auto values = curve([](int n) { return 0.2 + 0.01 * std::pow(n - 20, 2); });
     values[19] = std::numeric_limits<double>::infinity();
-    EXPECT_EQ(find_minimum(values, {}).n, 19);
+    EXPECT_EQ(find_minimum(values, 0.2, {}).n, 19);
     for (std::size_t i = 7; i < values.size(); ++i) values[i] = std::nan("");
-    const auto found = find_minimum(values, {});
+    const auto found = find_minimum(values, 0.2, {});
     EXPECT_EQ(found.n, 0);
     EXPECT_FALSE(found.clear);
 }

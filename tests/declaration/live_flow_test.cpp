@@ -98,6 +98,23 @@ TEST(LiveFlow, DeadAndStuckChannelsHaveStatesOfTheirOwn) {
     EXPECT_NE(verdict->channels[0].state, ChannelState::stuck);
 }
 
+TEST(LiveFlow, TheCriterionBeginsAnewAfterAGapThatIsTooLongToFill) {
+    TestWindow window = exponentials(400, rises_C, 7);
+    std::vector<double>& samples = window.channels[1].values;
+    std::fill(samples.begin() + 100, samples.begin() + 130, no_value);
+    TestWindow after = window;
+    std::fill_n(after.channels[1].values.begin(), 130, no_value);
+    FlowOptions options = quick();
+    options.sweep_when = SweepWhen::always;
+    const std::set<std::string> others{"T3", "T4", "T5", "T6"};
+    const auto verdict = LiveFlow(options).identify(window, others, sequential_for, never);
+    const auto expected = LiveFlow(options).identify(after, others, sequential_for, never);
+    ASSERT_TRUE(verdict && expected);
+    ASSERT_EQ(verdict->channels[0].rmse_by_n_C.size(), options.sweep.last_lag) << verdict->channels[0].reason;
+    EXPECT_EQ(verdict->channels[0].rmse_by_n_C, expected->channels[0].rmse_by_n_C);
+    EXPECT_TRUE(std::isnan(verdict->channels[0].svr.equilibrium_time_min));
+}
+
 TEST(LiveFlow, SaysWhatIsMissing) {
     const TestWindow window = exponentials(40, rises_C, 6);
     FlowOptions options = quick();

@@ -71,6 +71,16 @@ TEST(Gaps, LongerThanStatedAreRefused) {
               "21 samples in a row are missing from sample 50 on: at most 20 are interpolated");
 }
 
+TEST(Gaps, TheSamplesAfterTheNewestLongOneBeginWhereItEnds) {
+    auto values = warm_up(200);
+    EXPECT_EQ(after_last_long_gap(values, {}), 0u);
+    for (std::size_t k = 0; k < 30; ++k) values[k] = NAN;     // before the first
+    for (std::size_t k = 50; k < 71; ++k) values[k] = NAN;    // long
+    for (std::size_t k = 100; k < 120; ++k) values[k] = NAN;  // as long as may be filled
+    for (std::size_t k = 170; k < 200; ++k) values[k] = NAN;  // after the last
+    EXPECT_EQ(after_last_long_gap(values, {}), 71u);
+}
+
 TEST(Gaps, AtTheEndsAreLeftOutAndNeverExtrapolated) {
     auto values = warm_up(100);
     for (const std::size_t k : {0U, 1U, 97U, 98U, 99U}) values[k] = NAN;

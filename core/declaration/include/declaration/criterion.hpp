@@ -15,14 +15,16 @@ namespace thermbal {
 /// the curve has turned or levelled off before its end (falling <= edge_fall): a curve that still falls at
 /// the largest n has its minimum somewhere beyond. On free runs that follow the filtered window down to its
 /// noise the curve ends in a floor, and which n of the floor is lowest means nothing: hence levelled off is
-/// enough.
+/// enough, and so is an RMSE of floor_in_noises: what more lags gain below it is what the filter has left of
+/// the noise.
 struct CriterionOptions {
     double min_depth = 0.1;  ///< ln: the minimum is at most 90 % of what few lags give
     double min_depth_in_scatters =
         4.0;           ///< of 35 values of white noise the lowest lies 3.4 below the upper decile
     int min_lags = 8;  ///< fewer usable n than this are no curve
     int edge_lags = 5;
-    double edge_fall = 0.25;  ///< ln
+    double edge_fall = 0.25;       ///< ln
+    double floor_in_noises = 0.7;  ///< RMSE at the minimum, in standard deviations of one reading
 };
 
 struct RmseMinimum {
@@ -31,12 +33,14 @@ struct RmseMinimum {
     double depth = 0.0;
     double scatter = 0.0;
     double falling = 0.0;
+    double noise_C = 0.0;  ///< standard deviation of one reading
     bool clear = false;
     Guard guard;  ///< "clear_minimum", with the figures above
 };
 
 /// `rmse_by_n_C[i]` belongs to n = i + 1; a value that is not finite and positive (a free run that diverged)
-/// counts as worse than any other.
-RmseMinimum find_minimum(std::span<const double> rmse_by_n_C, const CriterionOptions& options);
+/// counts as worse than any other. `noise_C`: standard deviation of one reading, rounding included.
+RmseMinimum find_minimum(std::span<const double> rmse_by_n_C, double noise_C,
+                         const CriterionOptions& options);
 
 }  // namespace thermbal

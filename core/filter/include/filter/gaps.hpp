@@ -33,4 +33,8 @@ struct FilledWindow {
 /// any thread.
 Result<FilledWindow> fill_short_gaps(std::span<const double> temperature_C, const GapOptions& options);
 
+/// The first good sample after the newest gap that is too long to be filled; 0 without one. Missing samples
+/// at either end are no gap.
+std::size_t after_last_long_gap(std::span<const double> temperature_C, const GapOptions& options);
+
 }  // namespace thermbal
