@@ -42,7 +42,7 @@ Result<std::vector<ChannelAgreement>> check_agreement(const Model& model, const 
     const auto data = make_fit_data(model, test, calibration);
     if (!data) return std::unexpected(data.error());
     const FitProblem problem(*data, model);
-    const auto fit = minimise(problem, {problem.prior_coordinates(), nullptr}, calibration);
+    const auto fit = minimise(problem, {problem.prior_coordinates(), nullptr}, calibration, sequential_for);
     if (!fit) return std::unexpected(fit.error());
     const auto found = disagreements_of(*data, fit->point, calibration.fidelity);
     for (const std::string& channel : data->seen.channels) {

@@ -13,7 +13,7 @@ namespace {
 
 std::vector<CalibratedParameter> describe(const FitProblem& problem, const Fit& fit) {
     const Eigen::MatrixXd covariance =
-        fit.hessian().ldlt().solve(Eigen::MatrixXd::Identity(problem.dimensions(), problem.dimensions()));
+        fit.hessian.ldlt().solve(Eigen::MatrixXd::Identity(problem.dimensions(), problem.dimensions()));
     const Eigen::VectorXd lower = problem.lower(), upper = problem.upper();
     std::vector<CalibratedParameter> described;
     for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
@@ -53,7 +53,7 @@ Result<ModelCalibration> calibrate(const Model& model, const RecordedTest& test,
     const FitProblem problem(*data, model);
     const auto before = problem.evaluate(problem.prior_coordinates());
     if (!before) return std::unexpected(before.error());
-    const auto fit = minimise(problem, {problem.prior_coordinates(), nullptr}, options);
+    const auto fit = minimise(problem, {problem.prior_coordinates(), nullptr}, options, sequential_for);
     if (!fit) return std::unexpected(fit.error());
     const auto after = problem.evaluate(model_alone(problem, fit->point.coordinates));
     if (!after) return std::unexpected(after.error());

@@ -34,7 +34,7 @@ std::pair<double, double> window_of(const Effect& effect, const Observation& see
 
 std::vector<CalibratedParameter> numbers_of(const Fit& fit, std::size_t effect) {
     const Eigen::MatrixXd covariance =
-        fit.hessian().ldlt().solve(Eigen::MatrixXd::Identity(fit.jacobian.cols(), fit.jacobian.cols()));
+        fit.hessian.ldlt().solve(Eigen::MatrixXd::Identity(fit.jacobian.cols(), fit.jacobian.cols()));
     std::vector<CalibratedParameter> numbers;
     for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
         const Parameter& parameter = fit.parameters[i];

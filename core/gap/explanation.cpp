@@ -52,7 +52,7 @@ double length_s(const FitData& data) {
 
 Result<Explanation> explained_from(const Evidence& evidence, std::vector<Effect> effects,
                                    const FitProblem& problem, const FitStart& start) {
-    auto fit = minimise(problem, start, evidence.calibration);
+    auto fit = minimise(problem, start, evidence.calibration, evidence.parallel_for);
     if (!fit) return std::unexpected(fit.error());
     Explanation explanation{std::move(effects), std::move(*fit), 0.0, 0.0};
     explanation.log_evidence = log_evidence(explanation.fit, length_s(evidence.run)) +

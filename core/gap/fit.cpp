@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include <Eigen/Cholesky>
 
@@ -53,7 +54,8 @@ Eigen::MatrixXd gram(const Eigen::MatrixXd& jacobian) {
 /// as they are; the rest follows the point.
 class Slope {
   public:
-    Slope(const FitProblem& problem, const FitStart& start) : problem_(problem) {
+    Slope(const FitProblem& problem, const FitStart& start, const ParallelFor& parallel_for)
+        : problem_(problem), parallel_for_(parallel_for) {
         const Eigen::Index size = problem.dimensions(), nuisances = problem.data().nuisances();
         const Eigen::Index samples = problem.data().seen.reading_C.size();
         jacobian_ = Eigen::MatrixXd::Zero(samples + size, size);
@@ -74,10 +76,16 @@ class Slope {
     }
 
     Result<void> follow(const FitPoint& point) {
-        for (const Eigen::Index i : moving_) {
-            auto column = problem_.sensitivity(point, i);
-            if (!column) return std::unexpected(column.error());
-            jacobian_.col(i) = *column;
+        std::vector<std::optional<Error>> failed(moving_.size());
+        parallel_for_(moving_.size(), [&](std::size_t k) {
+            auto column = problem_.sensitivity(point, moving_[k]);
+            if (column)
+                jacobian_.col(moving_[k]) = *column;
+            else
+                failed[k] = column.error();
+        });
+        for (const auto& error : failed) {
+            if (error) return std::unexpected(*error);
         }
         if (static_cast<Eigen::Index>(moving_.size()) == jacobian_.cols()) {
             hessian_ = gram(jacobian_);
@@ -95,19 +103,21 @@ class Slope {
 
   private:
     const FitProblem& problem_;
+    const ParallelFor& parallel_for_;
     std::vector<Eigen::Index> moving_;
     Eigen::MatrixXd jacobian_, hessian_;
 };
 
 }  // namespace
 
-Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const CalibrationOptions& options) {
+Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const CalibrationOptions& options,
+                     const ParallelFor& parallel_for) {
     const Eigen::VectorXd lower = problem.lower(), upper = problem.upper();
     auto first = problem.evaluate(start.coordinates.cwiseMax(lower).cwiseMin(upper));
     if (!first) return std::unexpected(first.error());
-    Fit fit{{}, problem.parameters(), std::move(*first), {}, 0, false};
+    Fit fit{{}, problem.parameters(), std::move(*first), {}, {}, 0, false};
     double damping = 1e-3;
-    Slope slope(problem, start);
+    Slope slope(problem, start, parallel_for);
     if (auto done = slope.follow(fit.point); !done) return std::unexpected(done.error());
     // Where moments of switching move with everything, more steps go nowhere.
     const int most_iterations =
@@ -137,6 +147,7 @@ Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const Cal
         if (auto done = slope.follow(fit.point); !done) return std::unexpected(done.error());
     }
     fit.jacobian = slope.jacobian();
+    fit.hessian = slope.hessian();
     fit.model = problem.model_at(fit.point.coordinates);
     return fit;
 }

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 
 #include "base/error.hpp"
+#include "base/parallel.hpp"
 #include "gap/calibrate.hpp"
 #include "network/parameters.hpp"
 #include "observation.hpp"
@@ -47,7 +48,8 @@ Result<FitData> make_fit_data(const Model& model, const RecordedTest& test,
 /// of the starts in C.
 struct FitPoint {
     Eigen::VectorXd coordinates;
-    Eigen::MatrixXd simulated_C;   ///< bins x observed sensors
+    Eigen::MatrixXd model_C;       ///< what the model alone says: bins x observed sensors
+    Eigen::MatrixXd simulated_C;   ///< the same with each sensor's place and gradient
     Eigen::MatrixXd difference_C;  ///< measured - simulated
     Eigen::VectorXd residual;      ///< whitened differences, then the priors
     double chi2 = 0.0;
@@ -58,10 +60,9 @@ struct Fit {
     std::vector<Parameter> parameters;  ///< with priors as before the fit
     FitPoint point;
     Eigen::MatrixXd jacobian;  ///< of point.residual
+    Eigen::MatrixXd hessian;   ///< jacobian' jacobian
     int iterations = 0;
     bool converged = false;
-
-    Eigen::MatrixXd hessian() const { return jacobian.transpose() * jacobian; }
 };
 
 using Simulated = Result<Eigen::MatrixXd>;
@@ -92,8 +93,14 @@ class FitProblem {
     Eigen::VectorXd upper() const;
 
   private:
-    /// Readings of the observed sensors at the bins; the last coordinates are the nuisances.
+    /// Readings of the observed sensors at the bins as the model says them, from the starts among the
+    /// coordinates.
     Simulated simulated(const Model& model, const Eigen::VectorXd& coordinates) const;
+    /// The same with the sensors' places and gradients among the coordinates.
+    Eigen::MatrixXd as_placed(Eigen::MatrixXd model_C, const Eigen::VectorXd& coordinates) const;
+    FitPoint point_at(const Eigen::VectorXd& coordinates, Eigen::MatrixXd model_C) const;
+    /// Whether a coordinate is one that only as_placed looks at.
+    bool is_of_a_place(Eigen::Index coordinate) const;
     double nuisance_sigma(Eigen::Index nuisance) const;
     /// Standard deviation of a flat prior: no number is less known than its bounds, no moment less than the
     /// run.
@@ -114,7 +121,9 @@ struct FitStart {
     const Eigen::MatrixXd* known_jacobian = nullptr;
 };
 
-/// Levenberg-Marquardt within bounds. Errors: those of the simulation at the start.
-Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const CalibrationOptions& options);
+/// Levenberg-Marquardt within bounds, the sensitivities by `parallel_for`. Errors: those of the simulation at
+/// the start.
+Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const CalibrationOptions& options,
+                     const ParallelFor& parallel_for);
 
 }  // namespace thermbal

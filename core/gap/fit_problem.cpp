@@ -119,7 +119,11 @@ Simulated FitProblem::simulated(const Model& model, const Eigen::VectorXd& coord
     }
     const auto simulation = simulate(model, inputs, data_->seen.time_s);
     if (!simulation) return std::unexpected(simulation.error());
-    Eigen::MatrixXd readings_C = simulation->reading_C(Eigen::all, data_->seen.sensors);
+    return simulation->reading_C(Eigen::all, data_->seen.sensors);
+}
+
+Eigen::MatrixXd FitProblem::as_placed(Eigen::MatrixXd readings_C, const Eigen::VectorXd& coordinates) const {
+    const auto nuisances = coordinates.tail(data_->nuisances());
     const auto places = nuisances.segment(static_cast<Eigen::Index>(data_->starts.size()), readings_C.cols());
     for (Eigen::Index column = 0; column < readings_C.cols(); ++column) {
         const double start_C = readings_C(0, column);
@@ -136,9 +140,9 @@ Simulated FitProblem::simulated(const Model& model, const Eigen::VectorXd& coord
 Simulated FitProblem::reading_change_by(const Fit& fit, const Effect& effect) const {
     Model model = fit.model;
     model.effects.push_back(effect);
-    auto readings_C = simulated(model, fit.point.coordinates);
-    if (readings_C) *readings_C -= fit.point.simulated_C;
-    return readings_C;
+    const auto model_C = simulated(model, fit.point.coordinates);
+    if (!model_C) return std::unexpected(model_C.error());
+    return as_placed(*model_C, fit.point.coordinates) - fit.point.simulated_C;
 }
 
 Result<Eigen::VectorXd> FitProblem::change_by(const Fit& fit, const Effect& effect) const {
@@ -148,11 +152,16 @@ Result<Eigen::VectorXd> FitProblem::change_by(const Fit& fit, const Effect& effe
 }
 
 Result<FitPoint> FitProblem::evaluate(const Eigen::VectorXd& coordinates) const {
+    auto model_C = simulated(model_at(coordinates), coordinates);
+    if (!model_C) return std::unexpected(model_C.error());
+    return point_at(coordinates, std::move(*model_C));
+}
+
+FitPoint FitProblem::point_at(const Eigen::VectorXd& coordinates, Eigen::MatrixXd model_C) const {
     const Observation& seen = data_->seen;
     const auto count = static_cast<Eigen::Index>(parameters_.size());
-    auto readings_C = simulated(model_at(coordinates), coordinates);
-    if (!readings_C) return std::unexpected(readings_C.error());
-    FitPoint point{coordinates, std::move(*readings_C), {}, {}, 0.0};
+    FitPoint point{coordinates, std::move(model_C), {}, {}, {}, 0.0};
+    point.simulated_C = as_placed(point.model_C, coordinates);
     point.difference_C = seen.reading_C - point.simulated_C;
     point.residual.resize(seen.reading_C.size() + dimensions());
     point.residual.head(seen.reading_C.size()) = data_->whitening(point.difference_C);
@@ -189,6 +198,10 @@ Eigen::VectorXd FitProblem::upper() const {
         bound(static_cast<Eigen::Index>(parameters_.size()) + k) = most_nuisance_sigmas * nuisance_sigma(k);
     }
     return bound;
+}
+
+bool FitProblem::is_of_a_place(Eigen::Index coordinate) const {
+    return coordinate >= static_cast<Eigen::Index>(parameters_.size() + data_->starts.size());
 }
 
 double FitProblem::nuisance_sigma(Eigen::Index nuisance) const {
@@ -237,7 +250,8 @@ Result<Eigen::VectorXd> FitProblem::sensitivity(const FitPoint& point, Eigen::In
     moved(coordinate) += step;
     if (moved(coordinate) > upper()(coordinate)) moved(coordinate) -= 2.0 * step;
     step = moved(coordinate) - point.coordinates(coordinate);
-    const auto ahead = evaluate(moved);
+    const auto ahead =
+        is_of_a_place(coordinate) ? Result<FitPoint>(point_at(moved, point.model_C)) : evaluate(moved);
     if (!ahead) return std::unexpected(ahead.error());
     Eigen::VectorXd column = (ahead->residual - point.residual) / step;
     if (number && parameter->is_time) {

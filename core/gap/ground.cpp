@@ -15,7 +15,7 @@ ScreeningGround::ScreeningGround(const Evidence& evidence, const Explanation& cu
     for (const FitData& holdout : evidence.holdouts) {
         auto there = forecast(holdout, evidence, current);
         if (!there) continue;
-        Fit fit{current.fit.model, {}, std::move(there->point), {}, 0, true};
+        Fit fit{current.fit.model, {}, std::move(there->point), {}, {}, 0, true};
         const Index rows = fit.point.simulated_C.rows();
         runs_.push_back(
             {FitProblem(holdout, current.fit.model), std::move(fit), pooled(there->sensitivity, rows)});
@@ -64,6 +64,7 @@ void ScreeningGround::stack() {
     }
     stacked_.jacobian.block(rows, 0, own, own) = current_->fit.jacobian.bottomRows(own);
     stacked_.point.residual.segment(rows, own) = current_->fit.point.residual.tail(own);
+    stacked_.hessian = stacked_.jacobian.transpose() * stacked_.jacobian;
 }
 
 Result<Eigen::VectorXd> ScreeningGround::change_by(const Effect& effect) const {

@@ -5,7 +5,7 @@ namespace thermbal {
 Linearisation::Linearisation(const Fit& fit)
     : fit_(&fit),
       samples_(fit.jacobian.rows() - fit.jacobian.cols()),
-      hessian_(fit.hessian()),
+      hessian_(fit.hessian),
       log_determinant_(hessian_.vectorD().array().abs().log().sum()),
       // A fit that stopped short of its optimum must not look like something missing.
       residual_(fit.point.residual.head(samples_) -

@@ -29,9 +29,10 @@ Fit with_pooled_readings(const Fit& fit) {
     const Eigen::Index rows = fit.point.simulated_C.rows(), readings = fit.point.simulated_C.size();
     const Eigen::Index priors = fit.jacobian.cols();
     const Eigen::MatrixXd some = pooled(fit.jacobian.topRows(readings), rows);
-    Fit result{fit.model, fit.parameters, {}, {}, fit.iterations, fit.converged};
+    Fit result{fit.model, fit.parameters, {}, {}, {}, fit.iterations, fit.converged};
     result.jacobian.resize(some.rows() + priors, priors);
     result.jacobian << some, fit.jacobian.bottomRows(priors);
+    result.hessian = result.jacobian.transpose() * result.jacobian;
     result.point.residual.resize(some.rows() + priors);
     result.point.residual << pooled(fit.point.residual.head(readings), rows), fit.point.residual.tail(priors);
     return result;

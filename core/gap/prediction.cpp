@@ -36,7 +36,7 @@ Eigen::MatrixXd spread_of(const FitProblem& there, const Fit& fit, Index starts_
     const Index starts_there = static_cast<Index>(there.data().starts.size());
     const Index places = shared_by(there, fit, starts_here);
     const Eigen::MatrixXd covariance =
-        fit.hessian().ldlt().solve(Eigen::MatrixXd::Identity(fit.jacobian.cols(), fit.jacobian.cols()));
+        fit.hessian.ldlt().solve(Eigen::MatrixXd::Identity(fit.jacobian.cols(), fit.jacobian.cols()));
     std::vector<Index> here, at;
     for (Index i = 0; i < numbers; ++i) {
         here.push_back(i);

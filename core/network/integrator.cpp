@@ -34,7 +34,8 @@ Integrator::Integrator(const CompiledNetwork& network, InputSchedule& schedule, 
       breaks_s_(schedule.jumps_s()),
       regimes_(regimes_of(network)),
       known_factors_(8) {
-    heat_W_.setZero(static_cast<Index>(network.node_names.size()));
+    for (Eigen::VectorXd* nodes : {&heat_W_, &from_slope_, &to_slope_})
+        nodes->setZero(static_cast<Index>(network.node_names.size()));
     breaks_s_.insert(breaks_s_.end(), network.breaks_s.begin(), network.breaks_s.end());
 }
 
@@ -118,35 +119,50 @@ double Integrator::try_step(double from_s, double h_s) {
     return 0.0;
 }
 
-bool Integrator::crosses(std::size_t thermostat, const Eigen::VectorXd& node_C) const {
+double Integrator::past_threshold_C(std::size_t thermostat, const Eigen::VectorXd& node_C) const {
     const Thermostat& one = network_.thermostats[thermostat];
     const double temperature_C = node_C[static_cast<Index>(one.node)];
-    return heat_.thermostat_on(thermostat) ? temperature_C < one.off_C : temperature_C > one.on_C;
+    return heat_.thermostat_on(thermostat) ? one.off_C - temperature_C : temperature_C - one.on_C;
+}
+
+double Integrator::furthest_past_threshold_C(const Eigen::VectorXd& node_C) const {
+    double furthest_C = -std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < network_.thermostats.size(); ++i)
+        furthest_C = std::max(furthest_C, past_threshold_C(i, node_C));
+    return furthest_C;
 }
 
 double Integrator::shorten_to_switching(double from_s, double h_s) {
-    const auto any_crosses = [this] {
-        for (std::size_t i = 0; i < network_.thermostats.size(); ++i) {
-            if (crosses(i, next_C_)) return true;
+    double behind_C = furthest_past_threshold_C(next_C_);
+    if (!(behind_C > 0.0)) return h_s;
+    // Just behind the crossing, so that the next step begins switched. A straight line between the two sides
+    // says where; a probe a little to the left, then one to the right, of that closes in from both.
+    const double close_s = 1e-6 * options_.max_step_s;
+    double before_C = furthest_past_threshold_C(node_C_), before_s = 0.0, behind_s = h_s;
+    for (int round = 0; behind_s - before_s > close_s; ++round) {
+        const double line_s = before_s + (behind_s - before_s) * before_C / (before_C - behind_C);
+        const double aside_s = round % 2 == 0 ? 0.4 * close_s : -0.4 * close_s;
+        const bool halve = round % 4 == 3 || !(before_C < 0.0);
+        const double middle_s =
+            halve ? 0.5 * (before_s + behind_s)
+                  : std::clamp(line_s + aside_s, before_s + 0.1 * close_s, behind_s - 0.1 * close_s);
+        try_step(from_s, middle_s);
+        const double middle_C = furthest_past_threshold_C(next_C_);
+        if (middle_C > 0.0) {
+            behind_s = middle_s;
+            behind_C = middle_C;
+        } else {
+            before_s = middle_s;
+            before_C = middle_C;
         }
-        return false;
-    };
-    if (!any_crosses()) return h_s;
-    // Just behind the crossing, so that the next step begins switched.
-    double before = 0.0;
-    double behind = h_s;
-    while (behind - before > 1e-6 * options_.max_step_s) {
-        const double middle = 0.5 * (before + behind);
-        try_step(from_s, middle);
-        (any_crosses() ? behind : before) = middle;
     }
-    try_step(from_s, behind);
-    return behind;
+    try_step(from_s, behind_s);
+    return behind_s;
 }
 
 void Integrator::switch_thermostats(double time_s) {
     for (std::size_t i = 0; i < network_.thermostats.size(); ++i) {
-        if (!crosses(i, node_C_)) continue;
+        if (!(past_threshold_C(i, node_C_) > 0.0)) continue;
         const bool on = !heat_.thermostat_on(i);
         heat_.switch_thermostat(i, on);
         switchings_.push_back({time_s, network_.thermostats[i].node, on});
@@ -156,9 +172,16 @@ void Integrator::switch_thermostats(double time_s) {
 void Integrator::accept(double from_s, double h_s) {
     ++steps_;
     if (sensors_.needs_slopes()) {
-        from_slope_.noalias() = system_->to_nodal * (begin_ - system_->rate_per_s.cwiseProduct(modal_));
-        modal_heat(from_s + h_s, next_C_, end_);
-        to_slope_.noalias() = system_->to_nodal * (end_ - system_->rate_per_s.cwiseProduct(next_modal_));
+        // Where nothing varies within a step, the heat at its end is that at its beginning.
+        if (network_.smooth)
+            modal_heat(from_s + h_s, next_C_, end_);
+        else
+            end_ = begin_;
+        const auto& rate_per_s = system_->rate_per_s;
+        for (const Index node : sensors_.lagged_nodes()) {
+            from_slope_[node] = system_->to_nodal.row(node).dot(begin_ - rate_per_s.cwiseProduct(modal_));
+            to_slope_[node] = system_->to_nodal.row(node).dot(end_ - rate_per_s.cwiseProduct(next_modal_));
+        }
         sensors_.advance({from_s, from_s + h_s, node_C_, next_C_, from_slope_, to_slope_,
                           heat_.ambient_C(from_s), heat_.ambient_C(from_s + h_s)});
     }

@@ -55,7 +55,9 @@ class Integrator {
     void modal_heat(double time_s, const Eigen::VectorXd& node_C, Eigen::VectorXd& modal_heat);
     void accept(double from_s, double h_s);
 
-    bool crosses(std::size_t thermostat, const Eigen::VectorXd& node_C) const;
+    /// By how much a node is past where its thermostat switches next; the second: of all thermostats.
+    double past_threshold_C(std::size_t thermostat, const Eigen::VectorXd& node_C) const;
+    double furthest_past_threshold_C(const Eigen::VectorXd& node_C) const;
     /// The largest part of the step that no thermostat's switching lies in; leaves that step in next_*.
     double shorten_to_switching(double from_s, double h_s);
     void switch_thermostats(double time_s);

@@ -1,5 +1,7 @@
 #include "sensor_chain.hpp"
 
+#include <algorithm>
+
 #include "phi.hpp"
 
 namespace thermbal {
@@ -14,14 +16,13 @@ struct End {
 
 /// tau ds/dt = T - s over a step of h, exactly, for the cubic T that has the right values and slopes at both
 /// ends.
-double lagged(double before_C, double h_s, double tau_s, End from, End to) {
+double lagged(double before_C, double h_s, double tau_s, const std::array<double, 5>& phi, End from, End to) {
     const double rise = to.value_C - from.value_C;
     const double begin = from.slope_C_per_s * h_s;
     const double end = to.slope_C_per_s * h_s;
     const double squared = 3.0 * rise - 2.0 * begin - end;
     const double cubed = begin + end - 2.0 * rise;
     const double a = h_s / tau_s;
-    const auto phi = phi_functions<5>(-a);
     return phi[0] * before_C +
            a * (from.value_C * phi[1] + begin * phi[2] + 2.0 * squared * phi[3] + 6.0 * cubed * phi[4]);
 }
@@ -29,8 +30,14 @@ double lagged(double before_C, double h_s, double tau_s, End from, End to) {
 }  // namespace
 
 SensorChain::SensorChain(const CompiledNetwork& network)
-    : network_(network), lagged_C_(network.sensors.size(), 0.0) {
-    for (const CompiledSensor& sensor : network.sensors) needs_slopes_ |= sensor.time_constant_s > 0.0;
+    : network_(network), lagged_C_(network.sensors.size(), 0.0), decays_(network.sensors.size()) {
+    for (const CompiledSensor& sensor : network.sensors) {
+        if (sensor.time_constant_s <= 0.0) continue;
+        needs_slopes_ = true;
+        const auto node = static_cast<Index>(sensor.node);
+        if (sensor.node != ambient_index && std::ranges::find(lagged_nodes_, node) == lagged_nodes_.end())
+            lagged_nodes_.push_back(node);
+    }
 }
 
 double SensorChain::ambient_share(std::size_t sensor, double time_s) const {
@@ -65,7 +72,9 @@ void SensorChain::advance(const StepEnds& step) {
                        measured(i, share, step.from_slope_C_per_s, ambient_slope)};
         const End to{measured(i, share, step.to_C, step.to_ambient_C),
                      measured(i, share, step.to_slope_C_per_s, ambient_slope)};
-        lagged_C_[i] = lagged(lagged_C_[i], h_s, network_.sensors[i].time_constant_s, from, to);
+        const double tau_s = network_.sensors[i].time_constant_s;
+        if (decays_[i].h_s != h_s) decays_[i] = {h_s, phi_functions<5>(-h_s / tau_s)};
+        lagged_C_[i] = lagged(lagged_C_[i], h_s, tau_s, decays_[i].phi, from, to);
     }
 }
 

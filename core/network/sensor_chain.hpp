@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include <Eigen/Core>
@@ -8,7 +9,7 @@
 
 namespace thermbal {
 
-/// The ends of one step, and how fast the nodes move there (needed only where a sensor lags).
+/// The ends of one step, and how fast the nodes under a lagging sensor move there.
 struct StepEnds {
     double from_s;
     double to_s;
@@ -26,6 +27,8 @@ class SensorChain {
     explicit SensorChain(const CompiledNetwork& network);
 
     bool needs_slopes() const { return needs_slopes_; }
+    /// Those under a lagging sensor, each once.
+    const std::vector<Eigen::Index>& lagged_nodes() const { return lagged_nodes_; }
     /// Every lagging sensor has come to rest.
     void begin(double time_s, const Eigen::VectorXd& node_C, double ambient_C);
     void advance(const StepEnds& step);
@@ -36,8 +39,16 @@ class SensorChain {
     double measured(std::size_t sensor, double share, const Eigen::VectorXd& node_values,
                     double ambient_value) const;
 
+    /// Of a sensor's lag over a step of h_s, kept because most steps are as long as the one before.
+    struct Decay {
+        double h_s = 0.0;
+        std::array<double, 5> phi{};
+    };
+
     const CompiledNetwork& network_;
     std::vector<double> lagged_C_;
+    std::vector<Decay> decays_;
+    std::vector<Eigen::Index> lagged_nodes_;
     bool needs_slopes_ = false;
 };
 

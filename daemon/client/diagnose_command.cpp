@@ -64,9 +64,9 @@ Result<Diagnosis> diagnosed(const DiagnoseCommand& command) {
     }
     DiagnoseOptions options;
     options.found_on = subject->name;
-    Progress progress("diagnose");
+    const Progress progress("diagnose");
     return diagnose(subject->model, subject->test, holdouts, options,
-                    progress.counting(parallel_on_threads(command.threads, false)));
+                    parallel_on_threads(command.threads, false));
 }
 
 Result<void> write_results(const DiagnoseCommand& command, const Diagnosis& diagnosis) {
