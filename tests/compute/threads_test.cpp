@@ -1,6 +1,10 @@
 #include "compute/threads.hpp"
 
 #include <atomic>
+#include <chrono>
+#include <mutex>
+#include <set>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -15,6 +19,48 @@ TEST(Threads, EveryBodyRunsExactlyOnce) {
         for (const auto& count : runs) EXPECT_EQ(count, 1);
         parallel_on_threads(threads, false)(0, [](std::size_t) { FAIL(); });
     }
+}
+
+TEST(Threads, ABodyMayCallAgainAndNoMoreRunAtOnceThanAskedFor) {
+    constexpr int threads = 3;
+    const ParallelFor parallel_for = parallel_on_threads(threads, false);
+    std::atomic<int> done = 0, running = 0, most = 0;
+    parallel_for(5, [&](std::size_t) {
+        parallel_for(20, [&](std::size_t) {
+            const int now = ++running;
+            for (int seen = most; seen < now && !most.compare_exchange_weak(seen, now);) {
+            }
+            std::this_thread::sleep_for(std::chrono::microseconds(200));
+            --running;
+            ++done;
+        });
+    });
+    EXPECT_EQ(done, 100);
+    EXPECT_LE(most, threads);
+    EXPECT_GT(most, 1);
+}
+
+TEST(Threads, WhoIsDoneHelpsABodyThatStillRuns) {
+    const ParallelFor parallel_for = parallel_on_threads(2, false);
+    std::atomic<bool> first_done = false;
+    std::set<std::thread::id> helping;
+    std::mutex mutex;
+    parallel_for(2, [&](std::size_t i) {
+        if (i == 0) {
+            first_done = true;
+            return;
+        }
+        // The other thread gives itself back a moment after its body has returned.
+        for (int attempt = 0; attempt < 1000 && helping.size() < 2; ++attempt) {
+            parallel_for(2, [&](std::size_t) {
+                std::this_thread::sleep_for(std::chrono::milliseconds(1));
+                const std::lock_guard lock(mutex);
+                helping.insert(std::this_thread::get_id());
+            });
+        }
+    });
+    EXPECT_TRUE(first_done);
+    EXPECT_EQ(helping.size(), 2U);
 }
 
 }  // namespace
