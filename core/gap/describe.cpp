@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include <Eigen/Cholesky>
 
@@ -70,10 +71,11 @@ std::vector<SeparatingExperiment> experiments_against(const Evidence& evidence, 
             return !one.kind.empty() && one.probability >= least_probability;
         }))
         return {};
-    std::vector<Effect> others = search.current.effects;
+    std::vector<std::size_t> others(search.current.effects.size());
+    std::iota(others.begin(), others.end(), 0);
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
-    const auto without =
-        others.empty() ? Result<Explanation>(search.base) : explain(evidence, others, nullptr);
+    const auto without = others.empty() ? Result<Explanation>(search.base)
+                                        : explain_with_only(evidence, search.current, others);
     if (!without) return {};
     return separating_experiments(
         evidence.run, search.current.fit.model,
@@ -97,12 +99,12 @@ Result<std::vector<FoundEffect>> describe_effects(const Evidence& evidence, cons
     std::vector<FoundEffect> found;
     const Fit& fit = search.current.fit;
     Explanation before = search.base;
-    std::vector<Effect> so_far;
+    std::vector<std::size_t> so_far;
     for (std::size_t k = 0; k < search.steps.size(); ++k) {
-        so_far.push_back(search.current.effects[k]);
+        so_far.push_back(k);
         Explanation after = search.current;
         if (k + 1 < search.steps.size()) {
-            auto fitted = explain(evidence, so_far, nullptr);
+            auto fitted = explain_with_only(evidence, search.current, so_far);
             if (!fitted) return std::unexpected(fitted.error());
             after = std::move(*fitted);
         }

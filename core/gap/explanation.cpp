@@ -101,6 +101,23 @@ Result<Explanation> explain_anew(const Evidence& evidence, std::vector<Effect> e
     return explained_from(evidence, std::move(effects), problem, start);
 }
 
+Result<Explanation> explain_with_only(const Evidence& evidence, const Explanation& explanation,
+                                      const std::vector<std::size_t>& kept) {
+    std::vector<Effect> effects;
+    for (const std::size_t k : kept) effects.push_back(explanation.effects[k]);
+    const std::size_t known = evidence.prior_model.effects.size();
+    const std::vector<Parameter>& parameters = explanation.fit.parameters;
+    const Eigen::VectorXd& coordinates = explanation.fit.point.coordinates;
+    std::vector<Eigen::Index> staying;
+    for (Eigen::Index i = 0; i < coordinates.size(); ++i) {
+        const auto p = static_cast<std::size_t>(i);
+        const bool found = p < parameters.size() && parameters[p].of_effect && parameters[p].effect >= known;
+        if (!found || std::ranges::binary_search(kept, parameters[p].effect - known)) staying.push_back(i);
+    }
+    const FitProblem problem(evidence.run, with_effects(evidence.prior_model, effects));
+    return explained_from(evidence, std::move(effects), problem, {coordinates(staying), nullptr});
+}
+
 Result<Explanation> polish(const Evidence& evidence, const Explanation& explanation) {
     const FitProblem problem(evidence.run, with_effects(evidence.prior_model, explanation.effects));
     return explained_from(evidence, explanation.effects, problem,

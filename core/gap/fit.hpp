@@ -82,6 +82,8 @@ class FitProblem {
     /// The priors' centres, the rest at zero.
     Eigen::VectorXd prior_coordinates() const;
     Model model_at(const Eigen::VectorXd& coordinates) const;
+    /// The run's inputs, with the starts that are among the coordinates.
+    Inputs inputs_at(const Eigen::VectorXd& coordinates) const;
     Result<FitPoint> evaluate(const Eigen::VectorXd& coordinates) const;
     /// Column of the Jacobian of FitPoint::residual by difference quotient.
     Result<Eigen::VectorXd> sensitivity(const FitPoint& point, Eigen::Index coordinate) const;

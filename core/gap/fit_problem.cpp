@@ -109,7 +109,7 @@ Model FitProblem::model_at(const Eigen::VectorXd& coordinates) const {
     return model;
 }
 
-Simulated FitProblem::simulated(const Model& model, const Eigen::VectorXd& coordinates) const {
+Inputs FitProblem::inputs_at(const Eigen::VectorXd& coordinates) const {
     Inputs inputs = data_->seen.inputs;
     const auto nuisances = coordinates.tail(data_->nuisances());
     for (std::size_t k = 0; k < data_->starts.size(); ++k) {
@@ -117,7 +117,11 @@ Simulated FitProblem::simulated(const Model& model, const Eigen::VectorXd& coord
             inputs.first_readings[reading].value_C += nuisances(static_cast<Eigen::Index>(k));
         }
     }
-    const auto simulation = simulate(model, inputs, data_->seen.time_s);
+    return inputs;
+}
+
+Simulated FitProblem::simulated(const Model& model, const Eigen::VectorXd& coordinates) const {
+    const auto simulation = simulate(model, inputs_at(coordinates), data_->seen.time_s);
     if (!simulation) return std::unexpected(simulation.error());
     return simulation->reading_C(Eigen::all, data_->seen.sensors);
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 
 namespace thermbal {
@@ -97,8 +98,9 @@ Result<void> take_effects(const Evidence& evidence, SearchResult& search, const 
 /// same afterwards.
 Result<bool> look_again(const Evidence& evidence, SearchResult& search) {
     const Effect old = search.current.effects.front();
-    const std::vector<Effect> others(search.current.effects.begin() + 1, search.current.effects.end());
-    auto without = explain(evidence, others, nullptr);
+    std::vector<std::size_t> others(search.current.effects.size() - 1);
+    std::iota(others.begin(), others.end(), 1);
+    auto without = explain_with_only(evidence, search.current, others);
     if (!without) return std::unexpected(without.error());
     const Survey found = survey(evidence, *without);
     Odds odds = odds_of(found, without->fit.model);
@@ -121,16 +123,17 @@ Result<bool> look_again(const Evidence& evidence, SearchResult& search) {
 Result<bool> take_instead(const Evidence& evidence, SearchResult& search) {
     if (search.left.kinds.empty() || search.left.kinds.front().probability < 0.5) return false;
     const Effect& left = search.left_start;
-    std::vector<Effect> effects;
+    std::vector<std::size_t> kept;
     std::vector<Step> steps;
     for (std::size_t k = 0; k < search.steps.size(); ++k) {
         if (is_dressing_up(search.current.effects[k], left, search.current.fit.model)) continue;
-        effects.push_back(search.current.effects[k]);
+        kept.push_back(k);
         steps.push_back(search.steps[k]);
     }
-    if (effects.size() == search.steps.size()) return false;
-    const auto without = explain(evidence, effects, nullptr);
+    if (kept.size() == search.steps.size()) return false;
+    const auto without = explain_with_only(evidence, search.current, kept);
     if (!without) return std::unexpected(without.error());
+    std::vector<Effect> effects = without->effects;
     effects.push_back(left);
     steps.push_back({left, search.left, false});
     auto instead = explain(evidence, std::move(effects), &*without);

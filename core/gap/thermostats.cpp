@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+
+#include <Eigen/QR>
 
 #include "heat_response.hpp"
 #include "network/simulate.hpp"
@@ -62,6 +65,23 @@ std::vector<double> moments_of(const Eigen::VectorXd& felt_C, const std::vector<
     return moments_s;
 }
 
+/// When the node turned: from warming to cooling, that is where its chiller was switched on, and back, each
+/// turn by `least_C` or more. Noise moves these less than the crossing of a threshold that is approached
+/// slowly.
+std::vector<double> turns_of(const Eigen::VectorXd& felt_C, const std::vector<double>& time_s,
+                             double least_C) {
+    std::vector<double> turns_s;
+    Index furthest = 0;
+    for (Index row = 0; row < felt_C.size(); ++row) {
+        const double sign = turns_s.size() % 2 == 0 ? 1.0 : -1.0;
+        if (sign * (felt_C(row) - felt_C(furthest)) > 0.0) furthest = row;
+        if (sign * (felt_C(furthest) - felt_C(row)) < least_C) continue;
+        turns_s.push_back(time_s[static_cast<std::size_t>(furthest)]);
+        furthest = row;
+    }
+    return turns_s;
+}
+
 /// To 1 W taken away from every odd moment to the next.
 Eigen::MatrixXd answer_to_cooling(const CourseOfReadings& answer_to_heat, const std::vector<double>& time_s,
                                   const std::vector<double>& moments_s) {
@@ -74,6 +94,19 @@ Eigen::MatrixXd answer_to_cooling(const CourseOfReadings& answer_to_heat, const 
         sign = -sign;
     }
     return change_C;
+}
+
+/// Mean temperature of the node when it was switched on, and when off.
+std::array<double, 2> thresholds_C(const Eigen::VectorXd& node_C, const std::vector<double>& time_s,
+                                   const std::vector<double>& moments_s) {
+    std::array<double, 2> sum_C{}, count{};
+    for (std::size_t k = 0; k < moments_s.size(); ++k) {
+        const auto row = std::min<Index>(std::ranges::lower_bound(time_s, moments_s[k]) - time_s.begin(),
+                                         node_C.size() - 1);
+        sum_C[k % 2] += node_C(row);
+        count[k % 2] += 1.0;
+    }
+    return {sum_C[0] / count[0], sum_C[1] / count[1]};
 }
 
 /// Searches the thresholds of a thermostat at one node.
@@ -90,9 +123,10 @@ class ThermostatSearch {
     Screened over(const Eigen::VectorXd& felt_C) {
         if (felt_C.size() == 0) return best_;
         const double warmest_C = felt_C.maxCoeff(), range_C = warmest_C - felt_C.minCoeff();
-        for (const double below : below_the_warmest) {
-            for (const double hysteresis : hysteresis_shares)
+        for (const double hysteresis : hysteresis_shares) {
+            for (const double below : below_the_warmest)
                 look_at(felt_C, warmest_C - below * range_C, hysteresis * range_C);
+            look_at_turns(felt_C, hysteresis * range_C);
         }
         double step = 0.5;
         for (int round = 0; round < 3 && best_.log_likelihood_gain > 0.0; ++round) {
@@ -110,11 +144,21 @@ class ThermostatSearch {
 
   private:
     void look_at(const Eigen::VectorXd& felt_C, double on_C, double hysteresis_C) {
-        const std::vector<double>& time_s = run_.seen.time_s;
-        const auto moments_s = moments_of(felt_C, time_s, on_C, hysteresis_C);
+        look_at(moments_of(felt_C, run_.seen.time_s, on_C, hysteresis_C), on_C, hysteresis_C);
+    }
+
+    void look_at_turns(const Eigen::VectorXd& felt_C, double least_C) {
+        const auto turns_s = turns_of(felt_C, run_.seen.time_s, least_C);
+        if (turns_s.size() < on_off_on) return;
+        const auto [on_C, off_C] = thresholds_C(felt_C, run_.seen.time_s, turns_s);
+        look_at(turns_s, on_C, on_C - off_C);
+    }
+
+    void look_at(const std::vector<double>& moments_s, double on_C, double hysteresis_C) {
         if (moments_s.size() < on_off_on) return;
         const Eigen::VectorXd change =
-            pooled(run_.whitening(answer_to_cooling(answer_to_heat_, time_s, moments_s)), felt_C.size());
+            pooled(run_.whitening(answer_to_cooling(answer_to_heat_, run_.seen.time_s, moments_s)),
+                   answer_to_heat_.rows());
         const auto gain = linearisation_.gain_of(change);
         if (gain.amplitude <= 0.0 || gain.log_likelihood <= best_.log_likelihood_gain) return;
         best_.log_likelihood_gain = gain.log_likelihood;
@@ -145,19 +189,6 @@ std::vector<std::string> nodes_that_speak_for_heat(const std::vector<Nameless>& 
     return nodes;
 }
 
-/// Mean temperature of the node when it was switched on, and when off.
-std::array<double, 2> thresholds_C(const Eigen::VectorXd& node_C, const std::vector<double>& time_s,
-                                   const std::vector<double>& moments_s) {
-    std::array<double, 2> sum_C{}, count{};
-    for (std::size_t k = 0; k < moments_s.size(); ++k) {
-        const auto row = std::min<Index>(std::ranges::lower_bound(time_s, moments_s[k]) - time_s.begin(),
-                                         node_C.size() - 1);
-        sum_C[k % 2] += node_C(row);
-        count[k % 2] += 1.0;
-    }
-    return {sum_C[0] / count[0], sum_C[1] / count[1]};
-}
-
 /// Of the node that an effect is at.
 std::vector<ThermostatSwitching> switchings_of(const Effect& effect, const Model& model,
                                                const Observation& seen) {
@@ -175,26 +206,109 @@ Evidence as_seen(Evidence evidence, const std::string& node, const std::vector<d
     return evidence;
 }
 
+/// The thresholds of one thermostat among the coordinates of a fit, moved until it switches when it was seen
+/// to.
+class ThresholdFit {
+  public:
+    /// `effect`: among the model's. Moments: on first. All outlive it.
+    ThresholdFit(const FitProblem& problem, std::size_t effect, const std::vector<double>& moments_s)
+        : problem_(problem), moments_s_(moments_s) {
+        const auto& parameters = problem.parameters();
+        const auto power = std::ranges::find_if(parameters, [&](const Parameter& parameter) {
+            return parameter.of_effect && parameter.effect == effect;
+        });
+        on_ = power - parameters.begin() + 1;
+        const Model model = problem.model_at(problem.prior_coordinates());
+        const auto node = std::ranges::find(model.nodes, model.effects[effect].at, &Node::name);
+        node_ = static_cast<std::size_t>(node - model.nodes.begin());
+    }
+
+    Eigen::VectorXd placed(Eigen::VectorXd coordinates, double on_C, double hysteresis_C) const {
+        const auto& parameters = problem_.parameters();
+        const auto put = [&](Index at, double value) {
+            coordinates(at) = parameters[static_cast<std::size_t>(at)].to_coordinate(value);
+        };
+        put(on_, on_C);
+        put(on_ + 1, hysteresis_C);
+        return coordinates;
+    }
+
+    /// Gauss-Newton on the moments, the first few, then more: a later one says little until those before it
+    /// are right.
+    Eigen::VectorXd aligned(Eigen::VectorXd coordinates) const {
+        for (std::size_t count = 3;; count *= 2) {
+            count = std::min(count, moments_s_.size());
+            for (int round = 0; round < 4; ++round) {
+                auto next = stepped(coordinates, count);
+                if (!next) break;
+                coordinates = std::move(*next);
+            }
+            if (count == moments_s_.size()) return coordinates;
+        }
+    }
+
+  private:
+    /// By how much each of the first moments is late; none where there are not that many.
+    std::optional<Eigen::VectorXd> late_s(const Eigen::VectorXd& coordinates, std::size_t count) const {
+        const auto simulation = simulate(problem_.model_at(coordinates), problem_.inputs_at(coordinates),
+                                         problem_.data().seen.time_s);
+        if (!simulation) return std::nullopt;
+        std::vector<double> switched_s;
+        for (const ThermostatSwitching& one : simulation->switchings) {
+            if (one.node == node_) switched_s.push_back(one.time_s);
+        }
+        if (switched_s.size() < count) return std::nullopt;
+        Eigen::VectorXd late(static_cast<Index>(count));
+        for (std::size_t k = 0; k < count; ++k) late(static_cast<Index>(k)) = switched_s[k] - moments_s_[k];
+        return late;
+    }
+
+    /// None where no step makes the first moments come closer.
+    std::optional<Eigen::VectorXd> stepped(const Eigen::VectorXd& coordinates, std::size_t count) const {
+        const auto late = late_s(coordinates, count);
+        if (!late) return std::nullopt;
+        const auto& hysteresis = problem_.parameters()[static_cast<std::size_t>(on_ + 1)];
+        const double probe_C = 0.01 * hysteresis.to_value(coordinates(on_ + 1));
+        Eigen::MatrixXd slope(late->size(), 2);
+        for (const Index k : {Index{0}, Index{1}}) {
+            Eigen::VectorXd moved = coordinates;
+            const double probe = k == 0 ? probe_C : 0.01;  // the hysteresis is on a logarithm
+            moved(on_ + k) += probe;
+            const auto then = late_s(moved, count);
+            if (!then) return std::nullopt;
+            slope.col(k) = (*then - *late) / probe;
+        }
+        const Eigen::Vector2d wanted = -slope.colPivHouseholderQr().solve(*late);
+        const double longest = std::max(std::abs(wanted(0)) / (30.0 * probe_C), std::abs(wanted(1)) / 0.3);
+        for (double share = 1.0 / std::max(longest, 1.0); share > 0.05; share *= 0.5) {
+            Eigen::VectorXd moved = coordinates;
+            moved.segment(on_, 2) += share * wanted;
+            const auto then = late_s(moved, count);
+            if (then && then->squaredNorm() < late->squaredNorm()) return moved;
+        }
+        return std::nullopt;
+    }
+
+    const FitProblem& problem_;
+    const std::vector<double>& moments_s_;
+    Index on_ = 0;  ///< coordinate of switch_on_C; that of hysteresis_C is the next
+    std::size_t node_ = 0;
+};
+
 /// A fit whose k-th effect ran when it was seen to (`schedule`: as_seen of that), as a thermostat: it
-/// switches at the temperatures that its node had then.
+/// switches about when it did then. Many cycles on, a hundredth of the hysteresis is half a cycle, and a fit
+/// to the readings would not find back from there.
 Result<Explanation> set_free(const Evidence& evidence, const Evidence& schedule, Explanation scheduled,
                              std::size_t k) {
     const Observation& seen = schedule.run.seen;
     const auto node_C = node_course(scheduled.fit.model, seen, scheduled.effects[k].at);
     if (node_C.size() == 0) return fail(NextStep::stop, "the chiller as seen cannot be simulated");
-    const auto [on_C, off_C] =
-        thresholds_C(node_C, seen.time_s, seen.inputs.seen_switchings.back().moments_s);
-    const std::size_t effect = evidence.prior_model.effects.size() + k;
-    const auto& parameters = scheduled.fit.parameters;
-    const auto power = std::ranges::find_if(parameters, [&](const Parameter& parameter) {
-        return parameter.of_effect && parameter.effect == effect;
-    });
-    const std::array values = {on_C, std::max(on_C - off_C, 0.02)};
-    for (std::size_t p = 0; p < values.size(); ++p) {
-        const auto number = power - parameters.begin() + 1 + static_cast<std::ptrdiff_t>(p);
-        scheduled.fit.point.coordinates(number) =
-            parameters[static_cast<std::size_t>(number)].to_coordinate(values[p]);
-    }
+    const std::vector<double>& moments_s = seen.inputs.seen_switchings.back().moments_s;
+    const auto [on_C, off_C] = thresholds_C(node_C, seen.time_s, moments_s);
+    const FitProblem free(evidence.run, with_effects(evidence.prior_model, scheduled.effects));
+    const ThresholdFit thresholds(free, evidence.prior_model.effects.size() + k, moments_s);
+    Eigen::VectorXd& coordinates = scheduled.fit.point.coordinates;
+    coordinates = thresholds.aligned(thresholds.placed(coordinates, on_C, std::max(on_C - off_C, 0.02)));
     return polish(evidence, scheduled);
 }
 
