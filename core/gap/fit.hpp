@@ -112,7 +112,7 @@ class FitProblem {
     const FitData* data_;
     Model prior_model_;
     std::vector<Parameter> parameters_;
-    bool steers_itself_;  ///< an effect of the model does
+    bool steers_itself_;  ///< an effect of the model does, and is not held
 };
 
 /// What a fit may start from and how far it goes.

@@ -88,8 +88,11 @@ FitProblem::FitProblem(const FitData& data, Model prior_model)
     : data_(&data),
       prior_model_(std::move(prior_model)),
       parameters_(parameters_of(prior_model_)),
-      steers_itself_(std::ranges::any_of(
-          prior_model_.effects, [](const Effect& effect) { return form_of(effect).steers_itself; })) {}
+      steers_itself_(std::ranges::any_of(prior_model_.effects, [&](const Effect& effect) {
+          const auto& held = data.seen.inputs.seen_switchings;
+          return form_of(effect).steers_itself &&
+                 std::ranges::find(held, effect.at, &Inputs::SeenSwitchings::node) == held.end();
+      })) {}
 
 Eigen::VectorXd FitProblem::prior_coordinates() const {
     Eigen::VectorXd coordinates = Eigen::VectorXd::Zero(dimensions());

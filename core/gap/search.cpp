@@ -5,6 +5,8 @@
 #include <numeric>
 #include <string>
 
+#include "thermostats.hpp"
+
 namespace thermbal {
 namespace {
 
@@ -70,8 +72,18 @@ void lift_doubt(SearchResult& search) {
     }
 }
 
+/// The best of a survey becomes what the search stands at.
+Result<void> stand_at(const Explanation& best, Evidence& evidence, SearchResult& search) {
+    let_go_of_others(evidence, best.effects);
+    auto polished = polish(evidence, best);
+    if (polished) polished = hold_thermostats(evidence, *polished);
+    if (!polished) return std::unexpected(polished.error());
+    search.current = std::move(*polished);
+    return {};
+}
+
 /// Takes effects until nothing more is missing or nothing more has a name.
-Result<void> take_effects(const Evidence& evidence, SearchResult& search, const DiagnoseOptions& options) {
+Result<void> take_effects(Evidence& evidence, SearchResult& search, const DiagnoseOptions& options) {
     while (true) {
         Survey found = survey(evidence, search.current);
         Odds odds = odds_of(found, search.current.fit.model);
@@ -79,9 +91,7 @@ Result<void> take_effects(const Evidence& evidence, SearchResult& search, const 
         const bool taken =
             support != Support::none && static_cast<int>(search.steps.size()) < options.max_effects;
         if (taken) {
-            auto polished = polish(evidence, best_of(found, odds).explanation);
-            if (!polished) return std::unexpected(polished.error());
-            search.current = std::move(*polished);
+            if (auto done = stand_at(best_of(found, odds).explanation, evidence, search); !done) return done;
             search.steps.push_back({search.current.effects.back(), odds, support == Support::relative});
         }
         if (!taken && !odds.kinds.empty())
@@ -96,10 +106,11 @@ Result<void> take_effects(const Evidence& evidence, SearchResult& search, const 
 /// The first effect against all that it might be instead, the others staying; it, or what takes its place,
 /// goes to the end. Nothing goes there when nothing speaks for it any more. True when the effects are not the
 /// same afterwards.
-Result<bool> look_again(const Evidence& evidence, SearchResult& search) {
+Result<bool> look_again(Evidence& evidence, SearchResult& search) {
     const Effect old = search.current.effects.front();
     std::vector<std::size_t> others(search.current.effects.size() - 1);
     std::iota(others.begin(), others.end(), 1);
+    let_go_of_others(evidence, {search.current.effects.begin() + 1, search.current.effects.end()});
     auto without = explain_with_only(evidence, search.current, others);
     if (!without) return std::unexpected(without.error());
     const Survey found = survey(evidence, *without);
@@ -110,9 +121,8 @@ Result<bool> look_again(const Evidence& evidence, SearchResult& search) {
         search.current = std::move(*without);
         return true;
     }
-    auto polished = polish(evidence, best_of(found, odds).explanation);
-    if (!polished) return std::unexpected(polished.error());
-    search.current = std::move(*polished);
+    if (auto done = stand_at(best_of(found, odds).explanation, evidence, search); !done)
+        return std::unexpected(done.error());
     const Effect& taken = search.current.effects.back();
     search.steps.push_back({taken, std::move(odds), support == Support::relative});
     return taken.kind != old.kind || taken.at != old.at;
@@ -120,7 +130,7 @@ Result<bool> look_again(const Evidence& evidence, SearchResult& search) {
 
 /// What is left may be what several names at its place only dress up: it is taken instead of them when that
 /// describes the run better. True when it was.
-Result<bool> take_instead(const Evidence& evidence, SearchResult& search) {
+Result<bool> take_instead(Evidence& evidence, SearchResult& search) {
     if (search.left.kinds.empty() || search.left.kinds.front().probability < 0.5) return false;
     const Effect& left = search.left_start;
     std::vector<std::size_t> kept;
@@ -139,16 +149,16 @@ Result<bool> take_instead(const Evidence& evidence, SearchResult& search) {
     auto instead = explain(evidence, std::move(effects), &*without);
     if (instead) instead = polish(evidence, *instead);
     if (!instead || instead->log_evidence < search.current.log_evidence) return false;
-    search.current = std::move(*instead);
     search.steps = std::move(steps);
+    if (auto done = stand_at(*instead, evidence, search); !done) return std::unexpected(done.error());
     return true;
 }
 
 }  // namespace
 
-Result<SearchResult> search_effects(const Evidence& evidence, Explanation base,
-                                    const DiagnoseOptions& options) {
+Result<SearchResult> search_effects(const Evidence& free, Explanation base, const DiagnoseOptions& options) {
     SearchResult search{{}, base, std::move(base), {}, {}, {}};
+    Evidence evidence = free;  // with the thermostats held that the search stands at
     if (auto done = take_effects(evidence, search, options); !done) return std::unexpected(done.error());
     bool changed = false;
     const std::size_t taken = search.steps.size();
@@ -165,6 +175,9 @@ Result<SearchResult> search_effects(const Evidence& evidence, Explanation base,
     if (*other) {
         if (auto done = take_effects(evidence, search, options); !done) return std::unexpected(done.error());
     }
+    auto released = release_thermostats(evidence, std::move(search.current));
+    if (!released) return std::unexpected(released.error());
+    search.current = std::move(*released);
     lift_doubt(search);
     doubt_what_is_dressed_up(search);
     return search;

@@ -200,9 +200,25 @@ std::vector<ThermostatSwitching> switchings_of(const Effect& effect, const Model
     return switchings;
 }
 
+using Held = std::vector<Inputs::SeenSwitchings>;
+
+Held::const_iterator held_at(const Evidence& evidence, const std::string& node) {
+    return std::ranges::find(evidence.run.seen.inputs.seen_switchings, node, &Inputs::SeenSwitchings::node);
+}
+
+bool is_held(const Evidence& evidence, const std::string& node) {
+    return held_at(evidence, node) != evidence.run.seen.inputs.seen_switchings.end();
+}
+
 /// The node's chiller runs when it was seen to.
 Evidence as_seen(Evidence evidence, const std::string& node, const std::vector<double>& moments_s) {
     evidence.run.seen.inputs.seen_switchings.push_back({node, moments_s});
+    return evidence;
+}
+
+Evidence as_it_switches(Evidence evidence, const std::string& node) {
+    std::erase_if(evidence.run.seen.inputs.seen_switchings,
+                  [&](const Inputs::SeenSwitchings& one) { return one.node == node; });
     return evidence;
 }
 
@@ -295,15 +311,16 @@ class ThresholdFit {
     std::size_t node_ = 0;
 };
 
-/// A fit whose k-th effect ran when it was seen to (`schedule`: as_seen of that), as a thermostat: it
-/// switches about when it did then. Many cycles on, a hundredth of the hysteresis is half a cycle, and a fit
-/// to the readings would not find back from there.
-Result<Explanation> set_free(const Evidence& evidence, const Evidence& schedule, Explanation scheduled,
-                             std::size_t k) {
+/// A fit whose k-th effect ran when it was seen to (`schedule`: holds that), as a thermostat: it switches
+/// about when it did then. Many cycles on, a hundredth of the hysteresis is half a cycle, and a fit to the
+/// readings would not find back from there.
+Result<Explanation> set_free(const Evidence& schedule, Explanation scheduled, std::size_t k) {
     const Observation& seen = schedule.run.seen;
-    const auto node_C = node_course(scheduled.fit.model, seen, scheduled.effects[k].at);
+    const std::string& node = scheduled.effects[k].at;
+    const Evidence evidence = as_it_switches(schedule, node);
+    const auto node_C = node_course(scheduled.fit.model, seen, node);
     if (node_C.size() == 0) return fail(NextStep::stop, "the chiller as seen cannot be simulated");
-    const std::vector<double>& moments_s = seen.inputs.seen_switchings.back().moments_s;
+    const std::vector<double>& moments_s = held_at(schedule, node)->moments_s;
     const auto [on_C, off_C] = thresholds_C(node_C, seen.time_s, moments_s);
     const FitProblem free(evidence.run, with_effects(evidence.prior_model, scheduled.effects));
     const ThresholdFit thresholds(free, evidence.prior_model.effects.size() + k, moments_s);
@@ -325,7 +342,7 @@ Result<Explanation> explain_thermostat(const Evidence& evidence, const Explanati
     if (!scheduled || (afresh && afresh->fit.point.chi2 < scheduled->fit.point.chi2))
         scheduled = std::move(afresh);
     if (!scheduled) return scheduled;
-    return set_free(evidence, seen, std::move(*scheduled), effects.size() - 1);
+    return set_free(seen, std::move(*scheduled), effects.size() - 1);
 }
 
 Result<Explanation> polish_thermostats(const Evidence& evidence, const Explanation& explanation) {
@@ -342,10 +359,52 @@ Result<Explanation> polish_thermostats(const Evidence& evidence, const Explanati
         const Evidence seen = as_seen(evidence, explanation.effects[k].at, moments_s);
         auto scheduled = polish(seen, explanation);
         if (!scheduled) continue;
-        auto freed = set_free(evidence, seen, std::move(*scheduled), k);
+        auto freed = set_free(seen, std::move(*scheduled), k);
         if (freed && (!best || freed->fit.point.chi2 < best->fit.point.chi2)) best = std::move(freed);
     }
     return best;
+}
+
+Result<Explanation> hold_thermostats(Evidence& evidence, const Explanation& explanation) {
+    const FitProblem problem(evidence.run, with_effects(evidence.prior_model, explanation.effects));
+    const Eigen::VectorXd& coordinates = explanation.fit.point.coordinates;
+    const auto simulation =
+        simulate(explanation.fit.model, problem.inputs_at(coordinates), evidence.run.seen.time_s);
+    if (!simulation) return std::unexpected(simulation.error());
+    bool more = false;
+    for (const Effect& effect : explanation.effects) {
+        if (!form_of(effect).steers_itself || is_held(evidence, effect.at)) continue;
+        const auto node = static_cast<std::size_t>(column_of(*simulation, effect.at));
+        std::vector<double> moments_s;
+        for (const ThermostatSwitching& one : simulation->switchings) {
+            if (one.node == node) moments_s.push_back(one.time_s);
+        }
+        if (moments_s.size() < on_off_on) continue;
+        evidence = as_seen(std::move(evidence), effect.at, moments_s);
+        more = true;
+    }
+    return more ? polish(evidence, explanation) : explanation;
+}
+
+void let_go_of_others(Evidence& evidence, const std::vector<Effect>& effects) {
+    std::erase_if(evidence.run.seen.inputs.seen_switchings, [&](const Inputs::SeenSwitchings& one) {
+        return std::ranges::none_of(effects, [&](const Effect& effect) {
+            return form_of(effect).steers_itself && effect.at == one.node;
+        });
+    });
+}
+
+Result<Explanation> release_thermostats(const Evidence& held, Explanation explanation) {
+    Evidence still_held = held;
+    for (std::size_t k = 0; k < explanation.effects.size(); ++k) {
+        const std::string node = explanation.effects[k].at;
+        if (!form_of(explanation.effects[k]).steers_itself || !is_held(still_held, node)) continue;
+        auto freed = set_free(still_held, std::move(explanation), k);
+        if (!freed) return freed;
+        explanation = std::move(*freed);
+        still_held = as_it_switches(std::move(still_held), node);
+    }
+    return explanation;
 }
 
 std::vector<Screened> screen_thermostats(const Evidence& evidence, const Explanation& current,

@@ -25,6 +25,17 @@ Result<Explanation> explain_thermostat(const Evidence& evidence, const Explanati
 /// so that other nuisances do not lose its moments. The better fit of these.
 Result<Explanation> polish_thermostats(const Evidence& evidence, const Explanation& explanation);
 
+/// Holds the thermostats of an explanation: from now on each chiller of theirs runs in the run when it does
+/// there, whatever else is tried. What moves with every number is nothing that a search could tell other
+/// effects from. The explanation, fitted with that; in held-out runs they stay free.
+Result<Explanation> hold_thermostats(Evidence& evidence, const Explanation& explanation);
+
+/// No longer holds what is no effect of an explanation.
+void let_go_of_others(Evidence& evidence, const std::vector<Effect>& effects);
+
+/// The explanation with its held thermostats as thermostats again.
+Result<Explanation> release_thermostats(const Evidence& held, Explanation explanation);
+
 /// Whether a thermostat's chiller ever stops in a run.
 bool switches_off(const Effect& effect, const Model& model, const Observation& seen);
 
