@@ -216,9 +216,19 @@ Evidence as_seen(Evidence evidence, const std::string& node, const std::vector<d
     return evidence;
 }
 
+/// In no run of the evidence is a chiller held that this says of.
+template <typename Predicate>
+void let_go(Evidence& evidence, Predicate of_node) {
+    const auto in = [&](FitData& data) {
+        std::erase_if(data.seen.inputs.seen_switchings,
+                      [&](const Inputs::SeenSwitchings& one) { return of_node(one.node); });
+    };
+    in(evidence.run);
+    std::ranges::for_each(evidence.holdouts, in);
+}
+
 Evidence as_it_switches(Evidence evidence, const std::string& node) {
-    std::erase_if(evidence.run.seen.inputs.seen_switchings,
-                  [&](const Inputs::SeenSwitchings& one) { return one.node == node; });
+    let_go(evidence, [&](const std::string& one) { return one == node; });
     return evidence;
 }
 
@@ -329,6 +339,17 @@ Result<Explanation> set_free(const Evidence& schedule, Explanation scheduled, st
     return polish(evidence, scheduled);
 }
 
+/// In the held-out runs it is held at what the explanation forecasts.
+void hold_in_holdouts(Evidence& evidence, const Effect& effect, const Model& model) {
+    for (FitData& holdout : evidence.holdouts) {
+        std::vector<double> moments_s;
+        for (const ThermostatSwitching& one : switchings_of(effect, model, holdout.seen))
+            moments_s.push_back(one.time_s);
+        if (!moments_s.empty())
+            holdout.seen.inputs.seen_switchings.push_back({effect.at, std::move(moments_s)});
+    }
+}
+
 }  // namespace
 
 Result<Explanation> explain_thermostat(const Evidence& evidence, const Explanation& current,
@@ -381,15 +402,16 @@ Result<Explanation> hold_thermostats(Evidence& evidence, const Explanation& expl
         }
         if (moments_s.size() < on_off_on) continue;
         evidence = as_seen(std::move(evidence), effect.at, moments_s);
+        hold_in_holdouts(evidence, effect, explanation.fit.model);
         more = true;
     }
     return more ? polish(evidence, explanation) : explanation;
 }
 
 void let_go_of_others(Evidence& evidence, const std::vector<Effect>& effects) {
-    std::erase_if(evidence.run.seen.inputs.seen_switchings, [&](const Inputs::SeenSwitchings& one) {
+    let_go(evidence, [&](const std::string& node) {
         return std::ranges::none_of(effects, [&](const Effect& effect) {
-            return form_of(effect).steers_itself && effect.at == one.node;
+            return form_of(effect).steers_itself && effect.at == node;
         });
     });
 }

@@ -25,9 +25,9 @@ Result<Explanation> explain_thermostat(const Evidence& evidence, const Explanati
 /// so that other nuisances do not lose its moments. The better fit of these.
 Result<Explanation> polish_thermostats(const Evidence& evidence, const Explanation& explanation);
 
-/// Holds the thermostats of an explanation: from now on each chiller of theirs runs in the run when it does
-/// there, whatever else is tried. What moves with every number is nothing that a search could tell other
-/// effects from. The explanation, fitted with that; in held-out runs they stay free.
+/// Holds the thermostats of an explanation: from now on each chiller of theirs runs when it does there, and
+/// in the held-out runs when it is forecast to, whatever else is tried. What moves with every number is
+/// nothing that a search could tell other effects from. The explanation, fitted with that.
 Result<Explanation> hold_thermostats(Evidence& evidence, const Explanation& explanation);
 
 /// No longer holds what is no effect of an explanation.
