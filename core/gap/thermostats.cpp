@@ -65,6 +65,12 @@ std::vector<double> moments_of(const Eigen::VectorXd& felt_C, const std::vector<
     return moments_s;
 }
 
+/// Of a course that is smooth without it.
+double noise_of(const Eigen::VectorXd& felt_C) {
+    const double seen_C = noise_from_differences_C({felt_C.begin(), felt_C.end()});
+    return std::isfinite(seen_C) ? std::max(seen_C, 1e-3) : 1e-3;
+}
+
 /// When the node turned: from warming to cooling, that is where its chiller was switched on, and back, each
 /// turn by `least_C` or more. Noise moves these less than the crossing of a threshold that is approached
 /// slowly.
@@ -123,11 +129,12 @@ class ThermostatSearch {
     Screened over(const Eigen::VectorXd& felt_C) {
         if (felt_C.size() == 0) return best_;
         const double warmest_C = felt_C.maxCoeff(), range_C = warmest_C - felt_C.minCoeff();
-        for (const double hysteresis : hysteresis_shares) {
-            for (const double below : below_the_warmest)
+        for (const double below : below_the_warmest) {
+            for (const double hysteresis : hysteresis_shares)
                 look_at(felt_C, warmest_C - below * range_C, hysteresis * range_C);
-            look_at_turns(felt_C, hysteresis * range_C);
         }
+        for (double turn_C = 5.0 * noise_of(felt_C); turn_C < range_C; turn_C *= 1.5)
+            look_at_turns(felt_C, turn_C);
         double step = 0.5;
         for (int round = 0; round < 3 && best_.log_likelihood_gain > 0.0; ++round) {
             const double on_C = best_.start.parameter("switch_on_C");
