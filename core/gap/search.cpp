@@ -75,8 +75,10 @@ void lift_doubt(SearchResult& search) {
 /// The best of a survey becomes what the search stands at.
 Result<void> stand_at(const Explanation& best, Evidence& evidence, SearchResult& search) {
     let_go_of_others(evidence, best.effects);
-    auto polished = polish(evidence, best);
+    const bool held_before = !evidence.run.seen.inputs.seen_switchings.empty();
+    auto polished = polish_thermostats(evidence, best);
     if (polished) polished = hold_thermostats(evidence, *polished);
+    if (polished && held_before) polished = hold_thermostats_anew(evidence, *polished);
     if (!polished) return std::unexpected(polished.error());
     search.current = std::move(*polished);
     return {};

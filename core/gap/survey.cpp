@@ -4,6 +4,7 @@
 
 #include "explanation.hpp"
 #include "ground.hpp"
+#include "network/simulate.hpp"
 #include "residual_timing.hpp"
 #include "thermostats.hpp"
 
@@ -60,14 +61,40 @@ Result<Explanation> fitted_with(const Evidence& evidence, const Explanation& cur
     return polish(evidence, *quick);
 }
 
+constexpr double nats_of_a_seen_cycle = 20.0;
+
+/// How clearly a timer's cycle is seen to go to and fro, in nats: against the same heat all the time. What is
+/// not seen to is a steady heat, whose name is another.
+double nats_of_cycling(const Evidence& evidence, const Explanation& explanation) {
+    Model steady = explanation.fit.model;
+    std::vector<EffectParameter>& numbers = steady.effects.back().parameters;
+    const auto number = [&](const char* name) {
+        return std::ranges::find(numbers, name, &EffectParameter::name);
+    };
+    constexpr double all_the_time = 0.98;
+    number("power_W")->value *= number("duty")->value / all_the_time;
+    number("duty")->value = all_the_time;
+    const FitProblem problem(evidence.run, with_effects(evidence.prior_model, explanation.effects));
+    const FitPoint& point = explanation.fit.point;
+    const auto simulation = simulate(steady, problem.inputs_at(point.coordinates), evidence.run.seen.time_s);
+    if (!simulation) return 0.0;
+    const Eigen::MatrixXd to_and_fro_C =
+        point.model_C - simulation->reading_C(Eigen::all, evidence.run.seen.sensors);
+    return 0.5 * evidence.run.whitening(to_and_fro_C).squaredNorm();
+}
+
 /// What sets in outside the run is only other numbers; what sets in right with a change of speed is what the
-/// model itself says too roughly of that change. A thermostat that never switches off is heat that sets in.
+/// model itself says too roughly of that change. A thermostat that never switches off is heat that sets in, a
+/// timer whose cycle is not seen a steady heat.
 bool sets_in_on_its_own(const Evidence& evidence, const Contender& contender) {
     constexpr double bins = 5.0;
     const Observation& seen = evidence.run.seen;
     const Model& fitted = contender.explanation.fit.model;
     const Effect& effect = fitted.effects.back();
     if (form_of(effect).steers_itself && !switches_off(effect, fitted, seen)) return false;
+    if (form_of(effect).name == "square_wave" &&
+        nats_of_cycling(evidence, contender.explanation) < nats_of_a_seen_cycle)
+        return false;
     const auto onset_s = onset_of(effect);
     if (!onset_s) return true;
     if (*onset_s < seen.time_s.front() || *onset_s > seen.time_s.back()) return false;

@@ -30,6 +30,10 @@ Result<Explanation> polish_thermostats(const Evidence& evidence, const Explanati
 /// nothing that a search could tell other effects from. The explanation, fitted with that.
 Result<Explanation> hold_thermostats(Evidence& evidence, const Explanation& explanation);
 
+/// The same once more where other effects have come to it: their moments were those of a fit that had to make
+/// up for what these do. The explanation as it is where that is no better.
+Result<Explanation> hold_thermostats_anew(Evidence& evidence, const Explanation& explanation);
+
 /// No longer holds what is no effect of an explanation.
 void let_go_of_others(Evidence& evidence, const std::vector<Effect>& effects);
 

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <string>
 
 #include <gtest/gtest.h>
 
 #include "carry_over.hpp"
 #include "explanation.hpp"
 #include "network/effect.hpp"
+#include "network/simulate.hpp"
 #include "odds.hpp"
 #include "small_machine.hpp"
 
@@ -74,6 +77,37 @@ TEST(Diagnose, FindsAChillerThatAThermostatSwitches) {
     EXPECT_NEAR(found.effect.parameter("switch_on_C"), 25.0, 0.2);
     EXPECT_NEAR(found.effect.parameter("hysteresis_C"), 1.0, 0.2);
     ASSERT_TRUE(found.cycle_s.has_value());
+}
+
+std::vector<ThermostatSwitching> switchings_of(const Model& model, double minutes) {
+    const RecordedTest test = measured_on(model, minutes, 0.0, 1);
+    return simulate(model, inputs_of(test), test.time_s).value().switchings;
+}
+
+TEST(Diagnose, AChillerDoesNotHideASensorThatDrifts) {
+    Model truth = with("sensor_drift", "T3", {{"rate_C_per_h", 0.3, 0.0}});
+    truth.effects.push_back({"coolant_cycling",
+                             "thermostat",
+                             "housing",
+                             {{"power_W", 120.0, 0.0}, {"switch_on_C", 25.0, 0.0}, {"hysteresis_C", 1.5, 0.0}},
+                             {}});
+    const auto diagnosis = diagnosis_of(truth);
+    ASSERT_TRUE(diagnosis.has_value()) << diagnosis.error().message;
+    std::set<std::string> kinds;
+    for (const FoundEffect& found : diagnosis->effects) kinds.insert(found.effect.kind);
+    EXPECT_EQ(kinds, (std::set<std::string>{"coolant_cycling", "sensor_drift"})) << diagnosis->reason;
+    const auto chiller = std::ranges::find_if(
+        diagnosis->effects, [](const FoundEffect& found) { return found.effect.kind == "coolant_cycling"; });
+    ASSERT_NE(chiller, diagnosis->effects.end());
+    EXPECT_EQ(chiller->at, "housing");
+    EXPECT_NEAR(chiller->effect.parameter("power_W"), 120.0, 20.0);
+    const auto switched = switchings_of(truth, 300.0);
+    ASSERT_GT(switched.size(), 20u);
+    const double cycle_s = (switched[20].time_s - switched[0].time_s) / 10.0;
+    ASSERT_TRUE(chiller->cycle_s.has_value());
+    EXPECT_NEAR(*chiller->cycle_s, cycle_s, 0.05 * cycle_s);
+    // Every cycle at its moment: one that slips by a quarter of itself leaves a quarter of a degree.
+    EXPECT_LT(diagnosis->run.after_rmse_C, 0.1);
 }
 
 TEST(Diagnose, TheExtendedModelIsAModelAgain) {

@@ -29,14 +29,13 @@ RecordedTest measured_on(const Model& model, double minutes, double noise_C, uns
         rpm.values.push_back(t < minutes * 40.0 ? 5000.0 : 0.0);
     }
     test.inputs = {rpm};
-    const auto simulation = simulate(model, inputs_of(test), test.time_s);
+    const Simulation simulation = simulate(model, inputs_of(test), test.time_s).value();
     std::mt19937 random(seed);
     std::normal_distribution<double> noise(0.0, noise_C);
     for (std::size_t i = 0; i < model.sensors.size(); ++i) {
         Column channel{model.sensors[i].channel, {}};
-        for (Eigen::Index row = 0; row < simulation->reading_C.rows(); ++row) {
-            channel.values.push_back(simulation->reading_C(row, static_cast<Eigen::Index>(i)) +
-                                     noise(random));
+        for (Eigen::Index row = 0; row < simulation.reading_C.rows(); ++row) {
+            channel.values.push_back(simulation.reading_C(row, static_cast<Eigen::Index>(i)) + noise(random));
         }
         test.channels.push_back(channel);
     }
