@@ -86,11 +86,12 @@ std::vector<ThermostatSwitching> switchings_of(const Model& model, double minute
 
 TEST(Diagnose, AChillerDoesNotHideASensorThatDrifts) {
     Model truth = with("sensor_drift", "T3", {{"rate_C_per_h", 0.3, 0.0}});
-    truth.effects.push_back({"coolant_cycling",
-                             "thermostat",
-                             "housing",
-                             {{"power_W", 120.0, 0.0}, {"switch_on_C", 25.0, 0.0}, {"hysteresis_C", 1.5, 0.0}},
-                             {}});
+    truth.effects.push_back(
+        {"coolant_cycling",
+         "thermostat",
+         "housing",
+         {{"power_W", 120.0, 0.0}, {"switch_on_C", 25.0, 0.0}, {"hysteresis_C", 1.5, 0.0}},
+         {}});
     const auto diagnosis = diagnosis_of(truth);
     ASSERT_TRUE(diagnosis.has_value()) << diagnosis.error().message;
     std::set<std::string> kinds;
