@@ -8,8 +8,8 @@ namespace thermbal {
 
 /// What is believed before the data of a step are looked at, and how evidence is turned into odds.
 struct OddsOptions {
-    double nothing_missing = 0.85;
-    double catalogue = 0.14;  ///< spread evenly over kinds, a kind's over its places
+    double nothing_missing = 0.55;
+    double catalogue = 0.44;  ///< spread evenly over kinds, a kind's over its places
     double nameless = 0.01;
     /// The nameless explanation also dresses up the model's own limits, which grow with the effect: it has to
     /// be better than the named one by this much before the name is doubted.
