@@ -15,12 +15,22 @@ namespace thermbal {
 namespace {
 
 /// Takes up to `wanted` of what is idle.
-std::size_t take(std::atomic<std::size_t>& idle, std::size_t wanted) {
-    std::size_t there = idle;
+int take(std::atomic<int>& idle, int wanted) {
+    int there = idle;
     while (there > 0 && !idle.compare_exchange_weak(there, there - std::min(there, wanted))) {
     }
-    return std::min(there, wanted);
+    return std::clamp(there, 0, wanted);
 }
+
+/// Whether this thread runs a body.
+struct InsideACall {
+    InsideACall() { ++depth; }
+    ~InsideACall() { --depth; }
+    InsideACall(const InsideACall&) = delete;
+    InsideACall& operator=(const InsideACall&) = delete;
+    static thread_local int depth;
+};
+thread_local int InsideACall::depth = 0;
 
 }  // namespace
 
@@ -31,21 +41,29 @@ void put_this_thread_last() {
 }
 
 ParallelFor parallel_on_threads(int threads, bool low_priority) {
-    const auto idle = std::make_shared<std::atomic<std::size_t>>(std::max(threads, 1) - 1);
+    const auto idle = std::make_shared<std::atomic<int>>(std::max(threads, 1) - 1);
     return [idle, low_priority](std::size_t count, const std::function<void(std::size_t)>& body) {
         std::atomic<std::size_t> next = 0;
         const auto work = [&] {
             if (low_priority) put_this_thread_last();
+            const InsideACall inside;
             for (std::size_t i = next++; i < count; i = next++) body(i);
         };
         std::vector<std::jthread> helpers;
-        for (std::size_t taken = count > 1 ? take(*idle, count - 1) : 0; taken > 0; --taken) {
+        const int others = static_cast<int>(std::min<std::size_t>(count, 1024)) - 1;
+        // Who has nothing left to begin is idle at once: a body that still runs may have use for a thread.
+        for (int taken = take(*idle, std::max(others, 0)); taken > 0; --taken) {
             helpers.emplace_back([&] {
                 work();
-                ++*idle;  // at once: a body that still runs elsewhere may have use for it
+                ++*idle;
             });
         }
         work();
+        // Inside a body the thread has more to do after this call, and stays taken.
+        if (InsideACall::depth > 0) return;
+        ++*idle;
+        helpers.clear();
+        --*idle;
     };
 }
 
