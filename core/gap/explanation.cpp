@@ -118,6 +118,12 @@ Result<Explanation> explain_with_only(const Evidence& evidence, const Explanatio
     return explained_from(evidence, std::move(effects), problem, {coordinates(staying), nullptr});
 }
 
+Result<Simulation> simulate_run(const Evidence& evidence, const Explanation& explanation,
+                                const Model& model) {
+    const FitProblem problem(evidence.run, with_effects(evidence.prior_model, explanation.effects));
+    return simulate(model, problem.inputs_at(explanation.fit.point.coordinates), evidence.run.seen.time_s);
+}
+
 Result<Explanation> polish(const Evidence& evidence, const Explanation& explanation) {
     const FitProblem problem(evidence.run, with_effects(evidence.prior_model, explanation.effects));
     return explained_from(evidence, explanation.effects, problem,

@@ -8,6 +8,7 @@
 #include "candidates.hpp"
 #include "fit.hpp"
 #include "gap/diagnose.hpp"
+#include "network/simulate.hpp"
 #include "placebo.hpp"
 
 namespace thermbal {
@@ -65,6 +66,9 @@ struct Survey {
     std::vector<Nameless> nameless;     ///< best first
 };
 Survey survey(const Evidence& evidence, const Explanation& current);
+
+/// What a model with the explanation's effects does in the run, from where the explanation starts it.
+Result<Simulation> simulate_run(const Evidence& evidence, const Explanation& explanation, const Model& model);
 
 struct Forecast {
     double log_density = 0.0;  ///< ln p(held-out run | run), up to a constant of the held-out run

@@ -58,9 +58,8 @@ std::vector<Effect> with_phases(const std::vector<Effect>& shapes) {
     for (const Effect& shape : shapes) {
         for (int k = 0; k < phases; ++k) {
             result.push_back(shape);
-            result.back().parameters.push_back({"duty", 0.5, 0.0});
-            result.back().parameters.push_back(
-                {"first_on_s", -shape.parameter("period_s") * k / phases, 0.0});
+            result.back().set_parameter("duty", 0.5);
+            result.back().set_parameter("first_on_s", -shape.parameter("period_s") * k / phases);
         }
     }
     return result;
@@ -89,8 +88,7 @@ std::vector<Effect> shapes_of(const Candidate& candidate, const Model& model, co
         for (const Effect& shape : shapes) {
             for (const double value : values) {
                 wider.push_back(shape);
-                auto& parameters = wider.back().parameters;
-                std::ranges::find(parameters, definition.name, &EffectParameter::name)->value = value;
+                wider.back().set_parameter(definition.name, value);
             }
         }
         shapes = std::move(wider);
@@ -153,7 +151,7 @@ class BestShape {
             const Effect middle = best_.start;
             for (const double side : {-1.0, 1.0}) {
                 Effect moved = middle;
-                std::ranges::find(moved.parameters, onset, &EffectParameter::name)->value += side * step_s;
+                moved.set_parameter(onset, moved.parameter(onset) + side * step_s);
                 look_at(std::move(moved), best_probe_);
             }
         }

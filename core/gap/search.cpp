@@ -112,9 +112,9 @@ Result<bool> look_again(Evidence& evidence, SearchResult& search) {
     const Effect old = search.current.effects.front();
     std::vector<std::size_t> others(search.current.effects.size() - 1);
     std::iota(others.begin(), others.end(), 1);
-    let_go_of_others(evidence, {search.current.effects.begin() + 1, search.current.effects.end()});
     auto without = explain_with_only(evidence, search.current, others);
     if (!without) return std::unexpected(without.error());
+    let_go_of_others(evidence, without->effects);
     const Survey found = survey(evidence, *without);
     Odds odds = odds_of(found, without->fit.model);
     search.steps.erase(search.steps.begin());

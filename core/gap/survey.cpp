@@ -4,7 +4,6 @@
 
 #include "explanation.hpp"
 #include "ground.hpp"
-#include "network/simulate.hpp"
 #include "residual_timing.hpp"
 #include "thermostats.hpp"
 
@@ -67,19 +66,15 @@ constexpr double nats_of_a_seen_cycle = 20.0;
 /// not seen to is a steady heat, whose name is another.
 double nats_of_cycling(const Evidence& evidence, const Explanation& explanation) {
     Model steady = explanation.fit.model;
-    std::vector<EffectParameter>& numbers = steady.effects.back().parameters;
-    const auto number = [&](const char* name) {
-        return std::ranges::find(numbers, name, &EffectParameter::name);
-    };
-    constexpr double all_the_time = 0.98;
-    number("power_W")->value *= number("duty")->value / all_the_time;
-    number("duty")->value = all_the_time;
-    const FitProblem problem(evidence.run, with_effects(evidence.prior_model, explanation.effects));
-    const FitPoint& point = explanation.fit.point;
-    const auto simulation = simulate(steady, problem.inputs_at(point.coordinates), evidence.run.seen.time_s);
+    Effect& effect = steady.effects.back();
+    const auto duty = std::ranges::find(form_of(effect).parameters, "duty", &EffectParameterDefinition::name);
+    const double all_the_time = duty->upper;
+    effect.set_parameter("power_W", effect.parameter("power_W") * effect.parameter("duty") / all_the_time);
+    effect.set_parameter("duty", all_the_time);
+    const auto simulation = simulate_run(evidence, explanation, steady);
     if (!simulation) return 0.0;
     const Eigen::MatrixXd to_and_fro_C =
-        point.model_C - simulation->reading_C(Eigen::all, evidence.run.seen.sensors);
+        explanation.fit.point.model_C - simulation->reading_C(Eigen::all, evidence.run.seen.sensors);
     return 0.5 * evidence.run.whitening(to_and_fro_C).squaredNorm();
 }
 

@@ -18,6 +18,7 @@ constexpr std::size_t most_nodes = 3;
 /// A chiller that is strong enough never lets its node get warmer than where it switches on.
 constexpr std::array below_the_warmest = {0.0, 0.004, 0.01, 0.02, 0.04, 0.08, 0.15};  ///< shares of the range
 constexpr std::array hysteresis_shares = {0.005, 0.012, 0.03, 0.07, 0.16, 0.35};      ///< of the range
+
 /// What the node's thermostat felt: the mean of the readings on the node, smoothed over three bins; what the
 /// model says where nothing is measured.
 Eigen::VectorXd felt_C(const Evidence& evidence, const Explanation& current, const std::string& node) {

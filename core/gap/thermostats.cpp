@@ -17,10 +17,7 @@ std::vector<double> moments_of(const Effect& effect, const Model& model, const O
 /// When the thermostat at a node switches in the run as an explanation has it.
 std::vector<double> moments_in(const Evidence& evidence, const Explanation& explanation,
                                const std::string& node) {
-    const FitProblem problem(evidence.run, with_effects(evidence.prior_model, explanation.effects));
-    const auto simulation =
-        simulate(explanation.fit.model, problem.inputs_at(explanation.fit.point.coordinates),
-                 evidence.run.seen.time_s);
+    const auto simulation = simulate_run(evidence, explanation, explanation.fit.model);
     return simulation ? moments_at(*simulation, node) : std::vector<double>{};
 }
 

@@ -20,6 +20,14 @@ double Effect::parameter(std::string_view parameter_name) const {
     return found == parameters.end() ? std::numeric_limits<double>::quiet_NaN() : found->value;
 }
 
+void Effect::set_parameter(std::string_view parameter_name, double value) {
+    const auto found = std::ranges::find(parameters, parameter_name, &EffectParameter::name);
+    if (found == parameters.end())
+        parameters.push_back({std::string(parameter_name), value, 0.0});
+    else
+        found->value = value;
+}
+
 std::optional<std::size_t> find_node(const Model& model, std::string_view name) {
     return position(model.nodes, name, &Node::name);
 }

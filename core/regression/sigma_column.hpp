@@ -34,9 +34,9 @@ class SigmaColumn {
 
     RoughColumn& rough() { return rough_; }
 
-    /// The mean over folds, or nothing as soon as it is sure to be above race.bound. Error: stop when
+    /// The mean over folds, or nothing as soon as it is sure to be above terms.bound. Error: stop when
     /// cancelled.
-    Result<std::optional<double>> mean_mse(const SigmaCandidate& candidate, const RaceTerms& race,
+    Result<std::optional<double>> mean_mse(const SigmaCandidate& candidate, const RaceTerms& terms,
                                            const Cancelled& cancelled);
 
     /// What is kept between calls of mean_mse(), in numbers; and lets go of it: the next call makes it again.

@@ -41,8 +41,9 @@ void put_this_thread_last() {
 }
 
 ParallelFor parallel_on_threads(int threads, bool low_priority) {
-    const auto idle = std::make_shared<std::atomic<int>>(std::max(threads, 1) - 1);
-    return [idle, low_priority](std::size_t count, const std::function<void(std::size_t)>& body) {
+    const std::size_t most = static_cast<std::size_t>(std::max(threads, 1));
+    const auto idle = std::make_shared<std::atomic<int>>(static_cast<int>(most) - 1);
+    return [most, idle, low_priority](std::size_t count, const std::function<void(std::size_t)>& body) {
         std::atomic<std::size_t> next = 0;
         const auto work = [&] {
             if (low_priority) put_this_thread_last();
@@ -50,9 +51,9 @@ ParallelFor parallel_on_threads(int threads, bool low_priority) {
             for (std::size_t i = next++; i < count; i = next++) body(i);
         };
         std::vector<std::jthread> helpers;
-        const int others = static_cast<int>(std::min<std::size_t>(count, 1024)) - 1;
+        const int others = static_cast<int>(std::clamp(count, std::size_t{1}, most)) - 1;
         // Who has nothing left to begin is idle at once: a body that still runs may have use for a thread.
-        for (int taken = take(*idle, std::max(others, 0)); taken > 0; --taken) {
+        for (int taken = take(*idle, others); taken > 0; --taken) {
             helpers.emplace_back([&] {
                 work();
                 ++*idle;

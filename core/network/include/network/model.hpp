@@ -85,6 +85,8 @@ struct Effect {
 
     /// NaN when the parameter is absent.
     double parameter(std::string_view name) const;
+    /// Adds it when it is absent.
+    void set_parameter(std::string_view name, double value);
 };
 
 /// A lumped thermal network of a machine: what an engineer writes down, and what diagnose extends. Plain
