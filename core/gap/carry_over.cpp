@@ -27,6 +27,29 @@ double log_likelihood_gained(const RunComparison& run) {
     return gained;
 }
 
+/// Sums over the held-out runs, before and after.
+struct SquaredGaps {
+    double before = 0.0, after = 0.0;
+};
+
+SquaredGaps squared_gaps(const std::vector<RunComparison>& runs) {
+    SquaredGaps sum;
+    for (const RunComparison& run : runs) {
+        sum.before += run.before_rmse_C * run.before_rmse_C;
+        sum.after += run.after_rmse_C * run.after_rmse_C;
+    }
+    return sum;
+}
+
+/// None where channels that gain something hide that the gap as a whole is no smaller.
+double log_likelihood_gained(const std::vector<RunComparison>& runs) {
+    const SquaredGaps gaps = squared_gaps(runs);
+    if (gaps.after >= gaps.before) return 0.0;
+    double gained = 0.0;
+    for (const RunComparison& run : runs) gained += log_likelihood_gained(run);
+    return gained;
+}
+
 void forget_effects(RunComparison& run) {
     run.after_C = run.before_C;
     run.after_rmse_C = run.before_rmse_C;
@@ -36,8 +59,7 @@ void forget_effects(RunComparison& run) {
 }  // namespace
 
 void withdraw_what_closes_no_gap(Diagnosis& diagnosis) {
-    double of_holdouts = 0.0;
-    for (const RunComparison& held : diagnosis.holdouts) of_holdouts += log_likelihood_gained(held);
+    const double of_holdouts = log_likelihood_gained(diagnosis.holdouts);
     const double of_the_run = log_likelihood_gained(diagnosis.run);
     if (diagnosis.effects.empty() || of_the_run >= least_of_the_run || of_holdouts >= least_of_holdouts)
         return;
@@ -60,12 +82,7 @@ void withdraw_what_closes_no_gap(Diagnosis& diagnosis) {
 }
 
 void doubt_what_does_not_carry_over(Diagnosis& diagnosis) {
-    double before = 0.0;
-    double after = 0.0;
-    for (const RunComparison& held : diagnosis.holdouts) {
-        before += held.before_rmse_C * held.before_rmse_C;
-        after += held.after_rmse_C * held.after_rmse_C;
-    }
+    const auto [before, after] = squared_gaps(diagnosis.holdouts);
     if (diagnosis.effects.empty() || !(after > much_worse * much_worse * before)) return;
     for (FoundEffect& found : diagnosis.effects) found.probability *= before / after;
     if (diagnosis.verdict == GapVerdict::explained) diagnosis.verdict = GapVerdict::partly_explained;

@@ -10,6 +10,7 @@
 #include "disagreement.hpp"
 #include "fidelity.hpp"
 #include "search.hpp"
+#include "spread.hpp"
 #include "thermostats.hpp"
 
 namespace thermbal {
@@ -80,13 +81,25 @@ Result<void> compare_runs(const Evidence& evidence, const RecordedTest& test,
     return {};
 }
 
+/// Calibrates with the numbers taken for as uncertain as the run shows them to be. Leaves in `evidence` what
+/// that was.
+Result<Explanation> calibrate_at_spread_seen(Evidence& evidence) {
+    constexpr int rounds = 2;  // what is seen is linear around the fit: the second is nearer to where it ends
+    auto calibrated = explain(evidence, {}, nullptr);
+    for (int round = 0; round < rounds && calibrated; ++round) {
+        take_for_spread(evidence, spread_seen(evidence, calibrated->fit));
+        calibrated = polish(evidence, *calibrated);
+    }
+    return calibrated;
+}
+
 /// Calibrates and searches; where what was found leaves the channels wandering further than was allowed for,
 /// once more with that allowed for. Leaves in `evidence` what was.
 Result<SearchResult> search_at_fidelity_seen(Evidence& evidence, const DiagnoseOptions& options) {
     constexpr int most_rounds = 3;
     constexpr double worth_another = 1.4;
     for (int round = 1;; ++round) {
-        auto calibrated = explain(evidence, {}, nullptr);
+        auto calibrated = calibrate_at_spread_seen(evidence);
         if (!calibrated) return std::unexpected(calibrated.error());
         auto search = search_effects(evidence, std::move(*calibrated), options);
         if (!search || round == most_rounds) return search;
@@ -110,6 +123,7 @@ Result<WrittenModels> as_written(const Evidence& evidence, const SearchResult& s
     // wander is to what is seen.
     allow_for(without_places,
               share_of_rise_seen(evidence.run, search.current.fit.point, evidence.calibration.fidelity));
+    take_for_spread(without_places, spread_seen(evidence, search.current.fit));
     auto calibrated = polish(without_places, search.base);
     if (!calibrated) return std::unexpected(calibrated.error());
     if (search.steps.empty()) return WrittenModels{calibrated->fit.model, calibrated->fit.model};

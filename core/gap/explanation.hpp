@@ -21,6 +21,7 @@ struct Evidence {
     std::vector<std::string> room_columns;
     CalibrationOptions calibration;
     ParallelFor parallel_for;
+    double spread = 1.0;  ///< uncertainty of prior_model's numbers over what the model states (spread_seen)
 };
 
 /// A model with effects, fitted to the run.

@@ -14,10 +14,12 @@ double log_prior(const Candidate& candidate, const Model& model, const OddsOptio
     return std::log(options.catalogue / kinds / forms / places);
 }
 
+/// How much better heat or an error of any course there describes the run than nothing does: none at all
+/// where only its freedom counts.
 double evidence_at(const Survey& survey, bool of_sensor, const std::string& at) {
     const auto found = std::ranges::find_if(
         survey.nameless, [&](const Nameless& one) { return one.of_sensor == of_sensor && one.at == at; });
-    return found == survey.nameless.end() ? 0.0 : found->log_bayes_factor;
+    return found == survey.nameless.end() ? 0.0 : std::max(0.0, found->log_bayes_factor);
 }
 
 /// Sensor or machine: heat of any course in a node also shows at the neighbours, an error of any course of

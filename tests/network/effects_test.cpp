@@ -33,6 +33,7 @@ std::vector<Effect> one_of_each() {
         {"friction_viscosity", "", "bearing", {{"beta_per_K", 0.03}, {"reference_C", 22.0}}, {}},
         {"preload_growth", "", "bearing", {{"growth_per_K", 0.08}}, {}},
         {"run_in_heat", "", "bearing", {{"power_W", 60.0}, {"time_constant_s", 1300.0}}, {}},
+        {"run_in_heat", "any_speed", "bearing", {{"power_W", 45.0}, {"time_constant_s", 1700.0}}, {}},
         {"motor_heat", "", "housing", {{"power_W", 75.0}}, {}},
         {"cutting_heat", "", "bearing", {{"power_W", 50.0}, {"onset_s", 1717.0}}, {}},
         {"spindle_stop", "", "", {{"duration_s", 905.0}, {"from_s", 2001.0}}, {}},

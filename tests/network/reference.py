@@ -93,7 +93,10 @@ class Network:
                 power *= max(0.0, 1 + effect["growth_per_K"] * (T[node] - housing))
         for effect in self.of("run_in_heat"):
             if effect["source"] == node:
-                power += effect["power_W"] * self.drive(source, inside) * math.exp(-t / effect["time_constant_s"])
+                drive = self.drive(source, inside)
+                if effect.get("form") == "any_speed":
+                    drive = 1.0 if drive > 0.0 else 0.0
+                power += effect["power_W"] * drive * math.exp(-t / effect["time_constant_s"])
         return power
 
     def conductance(self, a, b, g, difference, inside):

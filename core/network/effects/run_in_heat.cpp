@@ -11,12 +11,25 @@ void attach(const PlacedEffect& effect, NetworkBuilder& network) {
     const double power_W = effect.values[0];
     const double time_constant_s = effect.values[1];
     const std::size_t source = effect.at;
+    const bool at_any_speed = effect.form == 1;
     network.add_heat(
         network.node_of_source(source),
         [=](const NetworkState& state) {
-            return power_W * state.source_drive[source] * std::exp(-state.time_s / time_constant_s);
+            const double drive = state.source_drive[source];
+            const double share = at_any_speed && drive > 0.0 ? 1.0 : drive;
+            return power_W * share * std::exp(-state.time_s / time_constant_s);
         },
         Variation::smooth);
+}
+
+std::vector<EffectParameterDefinition> run_in_parameters() {
+    return {heat_power_parameter(),
+            {.name = "time_constant_s",
+             .lower = 120,
+             .upper = 36000,
+             .prior_centre = 2400,
+             .prior_sigma = 0.8,
+             .logarithmic = true}};
 }
 
 }  // namespace
@@ -30,13 +43,11 @@ EffectDefinition run_in_heat_effect() {
                   .site = EffectSite::source,
                   .equation =
                       "+ power_W * drive * exp(-t / time_constant_s), drive as the source's column scales it",
-                  .parameters = {heat_power_parameter(),
-                                 {.name = "time_constant_s",
-                                  .lower = 120,
-                                  .upper = 36000,
-                                  .prior_centre = 2400,
-                                  .prior_sigma = 0.8,
-                                  .logarithmic = true}}}},
+                  .parameters = run_in_parameters()},
+                 {.name = "any_speed",
+                  .site = EffectSite::source,
+                  .equation = "+ power_W * exp(-t / time_constant_s) while the source is driven",
+                  .parameters = run_in_parameters()}},
             .source =
                 "grease churning: high torque that drops to its steady value, up to 10 h (Tribology "
                 "International 108375; "
