@@ -178,26 +178,31 @@ RunComparison compared(double before_C, double after_C) {
     return run;
 }
 
-Diagnosis withdrawn_if_useless(double after_C, double held_after_C) {
+Diagnosis withdrawn_if_useless(double after_C, const RunComparison& held) {
     Diagnosis diagnosis;
     diagnosis.verdict = GapVerdict::explained;
     diagnosis.effects.emplace_back().effect.kind = "sensor_lag";
     diagnosis.run = compared(0.05, after_C);
-    diagnosis.holdouts = {compared(0.05, held_after_C)};
+    diagnosis.holdouts = {held};
     withdraw_what_closes_no_gap(diagnosis);
     return diagnosis;
 }
 
 TEST(Diagnose, AnEffectIsNotNamedToFillAGapThatItDoesNotClose) {
-    const Diagnosis useless = withdrawn_if_useless(0.0495, 0.051);
+    const Diagnosis useless = withdrawn_if_useless(0.0495, compared(0.05, 0.051));
     EXPECT_TRUE(useless.effects.empty());
     EXPECT_EQ(useless.verdict, GapVerdict::agrees);
     ASSERT_EQ(useless.suspects.size(), 1U);
     EXPECT_EQ(useless.suspects.front().kind, "sensor_lag");
     EXPECT_NE(useless.reason.find("sensor_lag"), std::string::npos) << "a person reads what it was";
     EXPECT_EQ(useless.run.after_rmse_C, 0.05);
-    EXPECT_EQ(withdrawn_if_useless(0.045, 0.06).effects.size(), 1U) << "the run is described better";
-    EXPECT_EQ(withdrawn_if_useless(0.05, 0.045).effects.size(), 1U) << "the held-out run is";
+    EXPECT_EQ(withdrawn_if_useless(0.045, compared(0.05, 0.06)).effects.size(), 1U)
+        << "the run is described better";
+    EXPECT_EQ(withdrawn_if_useless(0.05, compared(0.05, 0.045)).effects.size(), 1U) << "the held-out run is";
+    RunComparison one_channel_only = compared(0.05, 0.045);
+    one_channel_only.after_rmse_C = 0.051;
+    EXPECT_TRUE(withdrawn_if_useless(0.05, one_channel_only).effects.empty())
+        << "the gap as a whole is larger";
 }
 
 }  // namespace
