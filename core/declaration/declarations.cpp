@@ -9,51 +9,98 @@
 namespace thermbal {
 namespace {
 
-/// Why `declared` cannot stand any more beside what is known now; nullopt when it can.
-std::optional<std::string> contradiction(const ChannelVerdict& declared, const ChannelVerdict& now,
-                                         double regime_since_min) {
-    if (regime_since_min > declared.declared_at_min) {
-        return fmt::format("the regime changed at {:.1f} min, after the declaration at {:.1f} min",
-                           regime_since_min, declared.declared_at_min);
+std::string both(const ChannelVerdict& declared, const ChannelVerdict& now) {
+    return fmt::format(
+        "{:.2f} to {:.2f} C was declared at {:.1f} min, {:.2f} to {:.2f} C is known at {:.1f} min",
+        declared.steady_state_low_C, declared.steady_state_high_C, declared.declared_at_min,
+        now.steady_state_low_C, now.steady_state_high_C, now.window_end_min);
+}
+
+/// The declared interval and the one of a longer window may differ at their edges; they may not be apart.
+bool apart(const ChannelVerdict& declared, const ChannelVerdict& now) {
+    return now.steady_state_low_C > declared.steady_state_high_C ||
+           now.steady_state_high_C < declared.steady_state_low_C;
+}
+
+/// What is known now, itself within the tolerance, leaves out what was declared. That the room has moved
+/// since is no fault of the declaration.
+bool known_better(const ChannelVerdict& declared, const ChannelVerdict& now) {
+    const double half_C = 0.5 * (now.steady_state_high_C - now.steady_state_low_C);
+    const double room_C = std::isfinite(declared.room_C) ? now.room_C - declared.room_C : 0.0;
+    const double off_C = std::abs(now.steady_state_C - declared.steady_state_C - room_C);
+    return half_C <= now.tolerance_C && off_C > half_C && off_C > declared.tolerance_C;
+}
+
+ChannelVerdict measured_on(const ChannelVerdict& now, const std::string& why) {
+    ChannelVerdict verdict = now;
+    if (!now.declared()) return verdict;
+    verdict.state = ChannelState::measuring;  // a new declaration wants a window of its own
+    verdict.declared_at_min = verdict.stands_since_min = std::numeric_limits<double>::quiet_NaN();
+    verdict.reason = "an earlier declaration was withdrawn: " + why;
+    return verdict;
+}
+
+/// The sweep is not run again on a declared channel: its curve and its guard are those of the declaration.
+ChannelVerdict renewed(const ChannelVerdict& declared, const ChannelVerdict& now) {
+    ChannelVerdict verdict = now;
+    verdict.stands_since_min = declared.stands_since_min;
+    verdict.n = declared.n;
+    verdict.window_rmse_C = declared.window_rmse_C;
+    verdict.rmse_by_n_C = declared.rmse_by_n_C;
+    verdict.svr = declared.svr;
+    for (const Guard& guard : declared.guards) {
+        if (std::ranges::find(now.guards, guard.name, &Guard::name) == now.guards.end())
+            verdict.guards.push_back(guard);
     }
-    if (now.state == ChannelState::dead || now.state == ChannelState::stuck) return std::nullopt;
-    // The declared interval and the one of a longer window may differ at their edges; they may not be apart.
-    if (now.steady_state_low_C > declared.steady_state_high_C ||
-        now.steady_state_high_C < declared.steady_state_low_C) {
-        return fmt::format(
-            "{:.2f} to {:.2f} C was declared at {:.1f} min, {:.2f} to {:.2f} C is known at {:.1f} min",
-            declared.steady_state_low_C, declared.steady_state_high_C, declared.declared_at_min,
-            now.steady_state_low_C, now.steady_state_high_C, now.window_end_min);
-    }
-    return std::nullopt;
+    return verdict;
 }
 
 }  // namespace
 
+std::string_view to_string(DeclarationChange::Kind kind) {
+    switch (kind) {
+        case DeclarationChange::Kind::declared:
+            return "declared";
+        case DeclarationChange::Kind::renewed:
+            return "renewed";
+        case DeclarationChange::Kind::withdrawn:
+            return "withdrawn";
+    }
+    return "withdrawn";
+}
+
 std::vector<DeclarationChange> Declarations::update(const std::vector<ChannelVerdict>& fresh,
-                                                    double regime_since_min) {
+                                                    double regime_since_min, Renewals renewals) {
     std::vector<DeclarationChange> changes;
     std::vector<ChannelVerdict> next;
+    const auto change = [&](DeclarationChange::Kind kind, const ChannelVerdict& now, std::string reason,
+                            ChannelVerdict verdict) {
+        changes.push_back({kind, now.channel, std::move(reason)});
+        next.push_back(std::move(verdict));
+    };
     for (const ChannelVerdict& now : fresh) {
         const auto before = std::ranges::find(standing_, now.channel, &ChannelVerdict::channel);
-        if (before != standing_.end() && before->declared()) {
-            const auto why = contradiction(*before, now, regime_since_min);
-            if (!why) {
-                next.push_back(*before);
-                continue;
-            }
-            changes.push_back({DeclarationChange::Kind::withdrawn, now.channel, *why});
-            ChannelVerdict measured_on = now;
-            if (measured_on.declared()) {
-                measured_on.state = ChannelState::measuring;  // a new declaration wants a window of its own
-                measured_on.declared_at_min = std::numeric_limits<double>::quiet_NaN();
-                measured_on.reason = "an earlier declaration was withdrawn: " + *why;
-            }
-            next.push_back(std::move(measured_on));
+        if (before == standing_.end() || !before->declared()) {
+            if (now.declared())
+                changes.push_back({DeclarationChange::Kind::declared, now.channel, now.reason});
+            next.push_back(now);
             continue;
         }
-        if (now.declared()) changes.push_back({DeclarationChange::Kind::declared, now.channel, now.reason});
-        next.push_back(now);
+        if (regime_since_min > before->declared_at_min) {
+            const std::string why =
+                fmt::format("the regime changed at {:.1f} min, after the declaration at {:.1f} min",
+                            regime_since_min, before->declared_at_min);
+            change(DeclarationChange::Kind::withdrawn, now, why, measured_on(now, why));
+        } else if (now.state == ChannelState::dead || now.state == ChannelState::stuck) {
+            next.push_back(*before);
+        } else if (renewals == Renewals::wanted && now.declared() && known_better(*before, now)) {
+            change(DeclarationChange::Kind::renewed, now, both(*before, now), renewed(*before, now));
+        } else if (apart(*before, now) || (renewals == Renewals::wanted && known_better(*before, now))) {
+            const std::string why = both(*before, now);
+            change(DeclarationChange::Kind::withdrawn, now, why, measured_on(now, why));
+        } else {
+            next.push_back(*before);
+        }
     }
     standing_ = std::move(next);
     return changes;

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/median.hpp"
+#include "series/resolution.hpp"
 #include "series/sample.hpp"
 
 namespace thermbal {
@@ -206,12 +207,35 @@ double median_move_C(const TestWindow& window, std::size_t since) {
     return moved_C.empty() ? 0.0 : upper_median(std::move(moved_C));
 }
 
-/// The very same reading while the other channels warm: a sensor or an input that does not measure any more.
+/// Readings that jump by two steps of the resolution and more from one to the next cannot be the same for
+/// long, wherever between two steps the temperature rests.
+bool noise_shows(std::span<const double> readings_C) {
+    constexpr double share_of_jumps = 0.05;
+    const double jump_C = 1.5 * smallest_step(readings_C);
+    std::size_t jumps = 0;
+    std::size_t pairs = 0;
+    for (std::size_t i = 1; i < readings_C.size(); ++i) {
+        const double change_C = std::abs(readings_C[i] - readings_C[i - 1]);
+        if (!std::isfinite(change_C)) continue;
+        ++pairs;
+        if (change_C > jump_C) ++jumps;
+    }
+    return jump_C > 0.0 && static_cast<double>(jumps) > share_of_jumps * static_cast<double>(pairs);
+}
+
+/// The very same reading while the other channels warm, or where its own noise has shown before: a sensor or
+/// an input that does not measure any more.
 bool is_stuck(const GuardEvidence& evidence, const GuardOptions& options) {
-    const std::size_t start = start_of_last_run(evidence.samples.values);
-    const double run_min =
-        static_cast<double>(evidence.window.scans - start) * evidence.window.period_s / 60.0;
-    return run_min >= options.stuck_min && median_move_C(evidence.window, start) >= options.stuck_rise_C;
+    const std::span<const double> values = evidence.samples.values;
+    const std::size_t start = start_of_last_run(values);
+    const std::span<const double> run = values.subspan(start);
+    const auto scans_per_min = 60.0 / evidence.window.period_s;
+    if (static_cast<double>(run.size()) < options.stuck_min * scans_per_min) return false;
+    if (median_move_C(evidence.window, start) >= options.stuck_rise_C) return true;
+    const auto readings = std::ranges::count_if(run, [](double value) { return std::isfinite(value); });
+    return static_cast<double>(readings) >= options.stuck_min * scans_per_min * options.good_share &&
+           static_cast<double>(start) >= options.stuck_min * scans_per_min &&
+           noise_shows(values.first(start));
 }
 
 }  // namespace
@@ -256,8 +280,10 @@ void ask_samples(ChannelVerdict& verdict, const GuardEvidence& evidence, const F
     const bool stuck = is_stuck(evidence, options.guards);
     verdict.guards.push_back(
         {"follows_the_machine", !stuck,
-         stuck ? fmt::format("the very same reading for {:.0f} min or more while the machine warms",
-                             options.guards.stuck_min)
+         stuck ? fmt::format(
+                     "the very same reading for {:.0f} min or more, while the machine warms or against its "
+                     "own noise before",
+                     options.guards.stuck_min)
                : std::string("its readings change")});
     if (stuck) verdict.state = ChannelState::stuck;
     verdict.guards.push_back(enough_samples(evidence, options.guards));
@@ -266,12 +292,14 @@ void ask_samples(ChannelVerdict& verdict, const GuardEvidence& evidence, const F
     verdict.guards.push_back(room_is_quiet(evidence, options));
 }
 
-void take_estimate(ChannelVerdict& verdict, const GuardEvidence& evidence) {
+void take_estimate(ChannelVerdict& verdict, const GuardEvidence& evidence, const FlowOptions& options) {
     const ChannelEstimate* now = estimate_of(evidence.now, verdict.channel);
     if (now == nullptr) return;
     verdict.steady_state_C = now->steady_state_C;
     verdict.steady_state_low_C = now->steady_state_low_C;
     verdict.steady_state_high_C = now->steady_state_high_C;
+    verdict.tolerance_C = tolerance_of(*now, options);
+    if (evidence.now->has_ambient) verdict.room_C = evidence.now->ambient_tail_C;
     verdict.equilibrium_time_min = now->equilibrium_time_min;
     verdict.equilibrium_time_low_min = now->equilibrium_low_min;
     verdict.equilibrium_time_high_min = now->equilibrium_high_min;
@@ -327,6 +355,7 @@ void conclude(ChannelVerdict& verdict, double window_end_min, const FlowOptions&
     }
     verdict.state = ChannelState::declared;
     verdict.declared_at_min = window_end_min;
+    verdict.stands_since_min = window_end_min;
     verdict.reason = "declared";
 }
 

@@ -35,7 +35,7 @@ void ask_shared_modes(ChannelVerdict& verdict, const GuardEvidence& evidence, co
 void ask_sweep(ChannelVerdict& verdict, const Result<ChannelSweep>& swept, const FlowOptions& options);
 
 /// The shared modes' figures become the verdict's.
-void take_estimate(ChannelVerdict& verdict, const GuardEvidence& evidence);
+void take_estimate(ChannelVerdict& verdict, const GuardEvidence& evidence, const FlowOptions& options);
 
 /// State and reason from the guards.
 void conclude(ChannelVerdict& verdict, double window_end_min, const FlowOptions& options);

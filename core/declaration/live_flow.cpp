@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -33,12 +35,15 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
     WindowVerdict verdict{window.end_s() / 60.0, regime.since_s / 60.0, {}, {}, {}};
 
     forget_before(since.end_s() - 2.0 * options_.guards.look_back_min * 60.0, window.period_s);
-    const auto& now = estimate(since, regime.start_level_C);
-    std::vector<const SpectrumEstimate*> shorter;  // the same regime seen from a little earlier
+    std::vector<TestWindow> seen{since};  // and the same regime seen from a little earlier
     for (const double back : {1.0, 2.0}) {
-        const TestWindow before =
-            window_until(since, since.end_s() - back * options_.guards.look_back_min * 60.0);
-        const auto& estimated = estimate(before, regime.start_level_C);
+        seen.push_back(window_until(since, since.end_s() - back * options_.guards.look_back_min * 60.0));
+    }
+    estimate(seen, regime.start_level_C, parallel_for);
+    const auto& now = estimates_.at(window_key(since));
+    std::vector<const SpectrumEstimate*> shorter;
+    for (const TestWindow& before : std::span(seen).subspan(1)) {
+        const auto& estimated = estimates_.at(window_key(before));
         if (estimated) shorter.push_back(&estimated->estimate);
     }
     if (now) {
@@ -54,7 +59,7 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
         const GuardEvidence evidence{since, samples, regime, now ? &now->estimate : nullptr, shorter};
         ask_samples(channel, evidence, options_);
         if (channel.state == ChannelState::measuring) {
-            take_estimate(channel, evidence);
+            take_estimate(channel, evidence, options_);
             ask_shared_modes(channel, evidence, options_);
         }
         if (!settled.contains(channel.channel) && sweep_is_wanted(channel)) {
@@ -102,12 +107,20 @@ Result<ChannelSweep> LiveFlow::swept(const TestWindow& since, const std::string&
     return result;
 }
 
-const Result<ArchivedEstimate>& LiveFlow::estimate(const TestWindow& regime,
-                                                   const std::vector<double>& start_level_C) {
-    const std::pair key = window_key(regime);
-    const auto known = estimates_.find(key);
-    if (known != estimates_.end()) return known->second;
-    return estimates_.emplace(key, estimate_regime(regime, start_level_C, options_)).first->second;
+void LiveFlow::estimate(const std::vector<TestWindow>& windows, const std::vector<double>& start_level_C,
+                        const ParallelFor& parallel_for) {
+    std::vector<const TestWindow*> unknown;
+    for (const TestWindow& window : windows) {
+        const auto same = [&](const TestWindow* other) { return window_key(*other) == window_key(window); };
+        if (!estimates_.contains(window_key(window)) && std::ranges::none_of(unknown, same))
+            unknown.push_back(&window);
+    }
+    std::vector<std::optional<Result<ArchivedEstimate>>> estimated(unknown.size());
+    parallel_for(unknown.size(), [&](std::size_t i) {
+        estimated[i] = estimate_regime(*unknown[i], start_level_C, options_);
+    });
+    for (std::size_t i = 0; i < unknown.size(); ++i)
+        estimates_.emplace(window_key(*unknown[i]), std::move(*estimated[i]));
 }
 
 }  // namespace thermbal

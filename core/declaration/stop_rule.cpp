@@ -21,16 +21,20 @@ std::string_view to_string(ChannelState state) {
     return "measuring";
 }
 
-StopDecision decide_stop(std::span<const ChannelVerdict> verdicts, const std::vector<bool>& required) {
+StopDecision decide_stop(std::span<const ChannelVerdict> verdicts, const std::vector<bool>& required,
+                         double now_min, const StopOptions& options) {
     StopDecision decision;
     std::vector<std::string> broken;
     std::size_t declared = 0;
+    const ChannelVerdict* newest = nullptr;
     for (std::size_t i = 0; i < verdicts.size(); ++i) {
         if (!required[i]) continue;
         const ChannelVerdict& verdict = verdicts[i];
         switch (verdict.state) {
             case ChannelState::declared:
                 ++declared;
+                if (newest == nullptr || verdict.stands_since_min > newest->stands_since_min)
+                    newest = &verdict;
                 break;
             case ChannelState::barely_warming:
                 break;
@@ -43,9 +47,15 @@ StopDecision decide_stop(std::span<const ChannelVerdict> verdicts, const std::ve
                 break;
         }
     }
-    decision.stop = decision.waiting.empty() && declared > 0;
-    if (decision.stop) {
-        decision.reason = fmt::format("every required channel is declared ({} channels)", declared);
+    if (decision.waiting.empty() && newest != nullptr) {
+        const double stood_min = newest->stands_since_min + options.stands_min;
+        decision.stop = now_min >= stood_min;
+        decision.reason =
+            decision.stop
+                ? fmt::format("every required channel is declared ({} channels)", declared)
+                : fmt::format(
+                      "every required channel is declared; {}, the last of them, is watched until {:.1f} min",
+                      newest->channel, stood_min);
     } else if (!broken.empty()) {
         decision.reason = fmt::format("{}: mend the sensor, make the channel not required, or stop by hand",
                                       fmt::join(broken, ", "));

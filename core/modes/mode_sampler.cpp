@@ -60,6 +60,7 @@ double log_likelihood(const std::vector<WhitenedChannel>& channels, const ModePr
     for (const WhitenedChannel& channel : channels) {
         const double scale_squared = channel.scale * channel.scale;
         const double signed_scale = channel.direction < 0.0 ? -channel.scale : channel.scale;
+        double determinant = 1.0;  // of a few pivots at a time, so that they share a logarithm
         double log_determinant = 0.0;
         double fitted = 0.0;
         for (std::size_t row = 0; row < count; ++row) {
@@ -86,7 +87,11 @@ double log_likelihood(const std::vector<WhitenedChannel>& channels, const ModePr
                 for (std::size_t k = 0; k < column; ++k) value -= factor[row][k] * factor[column][k];
                 if (row == column) {
                     value = std::max(value, 1e-12);
-                    log_determinant += std::log(value);
+                    determinant *= value;
+                    if (determinant > 1e200 || determinant < 1e-200) {
+                        log_determinant += std::log(determinant);
+                        determinant = 1.0;
+                    }
                     factor[row][row] = std::sqrt(value);
                 } else {
                     factor[row][column] = value / factor[column][column];
@@ -97,6 +102,7 @@ double log_likelihood(const std::vector<WhitenedChannel>& channels, const ModePr
             solved[row] = value / factor[row][row];
             fitted += solved[row] * solved[row];
         }
+        log_determinant += std::log(determinant);
         total += 0.5 * (of_mean + fitted - log_determinant - log_variances -
                         static_cast<double>(count) * std::log(scale_squared));
     }

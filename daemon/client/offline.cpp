@@ -115,13 +115,11 @@ int run_learn(const LearnOptions& options) {
 int run_replay(const OfflineOptions& options) {
     const auto input = read_input(options);
     if (!input) return report_error(input.error());
-    const auto word = [](const ReplayChange& one) {
-        return one.change.kind == DeclarationChange::Kind::declared ? "declared" : "withdrawn";
-    };
     std::optional<Progress> progress("replay");
     const auto tell = [&](const ReplayChange& one) {
         if (options.json) return;
-        fmt::print("{:7.2f} min  {} {}: {}\n", one.at_min, one.change.channel, word(one), one.change.reason);
+        fmt::print("{:7.2f} min  {} {}: {}\n", one.at_min, one.change.channel, to_string(one.change.kind),
+                   one.change.reason);
     };
     const auto done = replay(*input, options, tell, *progress);
     progress.reset();
@@ -131,7 +129,7 @@ int run_replay(const OfflineOptions& options) {
         for (const ReplayChange& one : done->changes) {
             changes.push_back({{"at_min", one.at_min},
                                {"channel", one.change.channel},
-                               {"change", word(one)},
+                               {"change", to_string(one.change.kind)},
                                {"reason", one.change.reason}});
         }
         fmt::print("{}\n", json{{"test_stopped_at_min", number_or_null(done->stopped_at_min)},

@@ -57,7 +57,8 @@ Result<Replay> replay(const OfflineInput& input, const OfflineOptions& options,
             tell(done.changes.back());
         }
         done.decision =
-            decide_stop(declarations.standing(), std::vector<bool>(declarations.standing().size(), true));
+            decide_stop(declarations.standing(), std::vector<bool>(declarations.standing().size(), true),
+                        verdict->window_end_min);
         if (done.decision.stop) {
             done.stopped_at_min = verdict->window_end_min;
             break;

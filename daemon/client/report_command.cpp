@@ -52,7 +52,7 @@ void add_replay(TestReport& report, const Replay& done) {
     }
     for (const ReplayChange& one : done.changes) {
         const bool declared = one.change.kind == DeclarationChange::Kind::declared;
-        report.events.push_back({one.at_min, declared ? "declared" : "withdrawn", one.change.channel,
+        report.events.push_back({one.at_min, std::string(to_string(one.change.kind)), one.change.channel,
                                  declared ? declared_as(done, one) : one.change.reason});
     }
     report.end_reason =

@@ -141,7 +141,8 @@ void put_channels(Frame& frame, const WatchScene& scene, std::size_t rows) {
 
 Ink ink_of_event(const json& event) {
     const std::string kind = text(event, "kind");
-    if (kind == "declared" || kind == "all_declared" || kind == "stopped") return Ink::good;
+    if (kind == "declared" || kind == "renewed" || kind == "all_declared" || kind == "stopped")
+        return Ink::good;
     if (kind == "withdrawn" || kind == "aborted" || kind.ends_with("trouble")) return Ink::bad;
     return Ink::plain;
 }

@@ -39,6 +39,7 @@ nlohmann::json verdict_to_json(const ChannelVerdict& verdict) {
             {"state", to_string(verdict.state)},
             {"declared", verdict.declared()},
             {"declared_at_min", number_or_null(verdict.declared_at_min)},
+            {"stands_since_min", number_or_null(verdict.stands_since_min)},
             {"window_end_min", number_or_null(verdict.window_end_min)},
             {"n", verdict.n},
             {"window_rmse_C", number_or_null(verdict.window_rmse_C)},
@@ -47,6 +48,8 @@ nlohmann::json verdict_to_json(const ChannelVerdict& verdict) {
             {"steady_state_C", number_or_null(verdict.steady_state_C)},
             {"steady_state_low_C", number_or_null(verdict.steady_state_low_C)},
             {"steady_state_high_C", number_or_null(verdict.steady_state_high_C)},
+            {"tolerance_C", number_or_null(verdict.tolerance_C)},
+            {"room_C", number_or_null(verdict.room_C)},
             {"equilibrium_time_min", number_or_null(verdict.equilibrium_time_min)},
             {"equilibrium_time_low_min", number_or_null(verdict.equilibrium_time_low_min)},
             {"equilibrium_time_high_min", number_or_null(verdict.equilibrium_time_high_min)},
@@ -71,6 +74,8 @@ Result<ChannelVerdict> verdict_from_json(const nlohmann::json& json) {
         verdict.channel = json.at("channel").get<std::string>();
         verdict.state = state_from(json.at("state").get<std::string>());
         verdict.declared_at_min = number_from(json, "declared_at_min");
+        verdict.stands_since_min = number_from(json, "stands_since_min");
+        if (std::isnan(verdict.stands_since_min)) verdict.stands_since_min = verdict.declared_at_min;
         verdict.window_end_min = number_from(json, "window_end_min");
         verdict.n = json.at("n").get<int>();
         verdict.window_rmse_C = number_from(json, "window_rmse_C");
@@ -81,6 +86,8 @@ Result<ChannelVerdict> verdict_from_json(const nlohmann::json& json) {
         verdict.steady_state_C = number_from(json, "steady_state_C");
         verdict.steady_state_low_C = number_from(json, "steady_state_low_C");
         verdict.steady_state_high_C = number_from(json, "steady_state_high_C");
+        verdict.tolerance_C = number_from(json, "tolerance_C");
+        verdict.room_C = number_from(json, "room_C");
         verdict.equilibrium_time_min = number_from(json, "equilibrium_time_min");
         verdict.equilibrium_time_low_min = number_from(json, "equilibrium_time_low_min");
         verdict.equilibrium_time_high_min = number_from(json, "equilibrium_time_high_min");

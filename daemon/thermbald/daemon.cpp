@@ -74,7 +74,8 @@ void Daemon::take_identification(IdentificationResult result) {
         test_.spectrum = std::move(result.verdict->spectrum);
         test_.spectrum_window_min = result.verdict->window_end_min;
         const auto changes =
-            test_.declarations.update(result.verdict->channels, result.verdict->regime_since_min);
+            test_.declarations.update(result.verdict->channels, result.verdict->regime_since_min,
+                                      test_.state == TestState::running ? Renewals::wanted : Renewals::over);
         record_changes(changes, result.window_end_scan);
         server_.publish("predictions", predictions_json().value_or(nullptr));
         decide();
@@ -89,7 +90,7 @@ void Daemon::decide() {
             std::ranges::find(options_.config.channels, verdict.channel, &ChannelConfig::name);
         required.push_back(channel != options_.config.channels.end() && channel->required);
     }
-    test_.decision = decide_stop(test_.declarations.standing(), required);
+    test_.decision = decide_stop(test_.declarations.standing(), required, test_.spectrum_window_min);
     if (!test_.decision.stop || test_.state != TestState::running) return;
 
     test_.state = TestState::declared;
@@ -170,10 +171,12 @@ void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::
            records = std::move(records)](Store& store) { return store.record_identifications(id, records); },
           "identifications");
     for (const DeclarationChange& change : changes) {
-        if (change.kind == DeclarationChange::Kind::withdrawn) {
+        if (change.kind != DeclarationChange::Kind::declared) {
             write([id = test_.id, change](Store& store) {
                 return store.withdraw_declaration(id, change.channel, change.reason);
             });
+        }
+        if (change.kind == DeclarationChange::Kind::withdrawn) {
             event("withdrawn",
                   fmt::format("{}: the declaration is withdrawn: {}", change.channel, change.reason),
                   change.channel);
@@ -185,10 +188,11 @@ void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::
         write([id = test_.id, record = std::move(record)](Store& store) {
             return store.record_declaration(id, record);
         });
-        event("declared",
-              fmt::format("{} settles at {:.2f} C ({:.2f} to {:.2f} C), 95 % of the rise at {:.0f} min",
+        event(std::string(to_string(change.kind)),
+              fmt::format("{} settles at {:.2f} C ({:.2f} to {:.2f} C), 95 % of the rise at {:.0f} min{}",
                           verdict.channel, verdict.steady_state_C, verdict.steady_state_low_C,
-                          verdict.steady_state_high_C, verdict.equilibrium_time_min),
+                          verdict.steady_state_high_C, verdict.equilibrium_time_min,
+                          change.kind == DeclarationChange::Kind::renewed ? "; " + change.reason : ""),
               verdict.channel);
         server_.publish("declaration", json);
     }

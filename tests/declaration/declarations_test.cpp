@@ -10,7 +10,8 @@ ChannelVerdict verdict(ChannelState state, double at_min, double low_C, double h
     made.channel = "T5";
     made.state = state;
     made.window_end_min = at_min;
-    if (state == ChannelState::declared) made.declared_at_min = at_min;
+    if (state == ChannelState::declared) made.declared_at_min = made.stands_since_min = at_min;
+    made.tolerance_C = 0.2;
     made.steady_state_C = 0.5 * (low_C + high_C);
     made.steady_state_low_C = low_C;
     made.steady_state_high_C = high_C;
@@ -24,7 +25,7 @@ TEST(Declarations, TheFirstDeclarationStandsWithItsFigures) {
     ASSERT_EQ(changes.size(), 1U);
     EXPECT_EQ(changes[0].kind, DeclarationChange::Kind::declared);
     EXPECT_TRUE(declarations.update({verdict(ChannelState::measuring, 64, 26.7, 26.95)}, 0).empty());
-    EXPECT_TRUE(declarations.update({verdict(ChannelState::declared, 66, 26.8, 27.0)}, 0).empty());
+    EXPECT_TRUE(declarations.update({verdict(ChannelState::declared, 66, 26.7, 26.98)}, 0).empty());
     EXPECT_EQ(declarations.standing()[0].declared_at_min, 62);
     EXPECT_EQ(declarations.standing()[0].steady_state_low_C, 26.6);
     EXPECT_EQ(declarations.declared_channels(), std::set<std::string>{"T5"});
@@ -33,7 +34,7 @@ TEST(Declarations, TheFirstDeclarationStandsWithItsFigures) {
 TEST(Declarations, ALaterWindowThatExcludesItWithdrawsIt) {
     Declarations declarations;
     declarations.update({verdict(ChannelState::declared, 62, 26.6, 26.9)}, 0);
-    const auto changes = declarations.update({verdict(ChannelState::declared, 80, 26.95, 27.2)}, 0);
+    const auto changes = declarations.update({verdict(ChannelState::measuring, 80, 26.95, 27.2)}, 0);
     ASSERT_EQ(changes.size(), 1U);
     EXPECT_EQ(changes[0].kind, DeclarationChange::Kind::withdrawn);
     EXPECT_EQ(declarations.standing()[0].state, ChannelState::measuring);
@@ -41,6 +42,67 @@ TEST(Declarations, ALaterWindowThatExcludesItWithdrawsIt) {
     const auto again = declarations.update({verdict(ChannelState::declared, 82, 26.95, 27.2)}, 0);
     ASSERT_EQ(again.size(), 1U);
     EXPECT_EQ(again[0].kind, DeclarationChange::Kind::declared);
+}
+
+TEST(Declarations, FiguresThatALaterWindowKnowsBetterAreRenewed) {
+    Declarations declarations;
+    auto first = verdict(ChannelState::declared, 62, 26.6, 26.9);
+    first.guards = {{"interval_within_tolerance", true, "then"}, {"clear_minimum", true, "at n = 7"}};
+    first.n = 7;
+    declarations.update({first}, 0);
+    auto later = verdict(ChannelState::declared, 80, 26.88, 27.08);
+    later.guards = {{"interval_within_tolerance", true, "now"}};
+    const auto changes = declarations.update({later}, 0);
+    ASSERT_EQ(changes.size(), 1U);
+    EXPECT_EQ(changes[0].kind, DeclarationChange::Kind::renewed);
+    EXPECT_EQ(changes[0].reason,
+              "26.60 to 26.90 C was declared at 62.0 min, 26.88 to 27.08 C is known at 80.0 min");
+    const ChannelVerdict& standing = declarations.standing()[0];
+    EXPECT_TRUE(standing.declared());
+    EXPECT_EQ(standing.steady_state_C, later.steady_state_C);
+    EXPECT_EQ(standing.declared_at_min, 80) << "its figures come from the window of 80 min";
+    EXPECT_EQ(standing.stands_since_min, 62);
+    EXPECT_EQ(standing.n, 7) << "the sweep was not asked again";
+    ASSERT_EQ(standing.guards.size(), 2U);
+    EXPECT_EQ(standing.guards[0].figures, "now");
+    EXPECT_EQ(standing.guards[1].figures, "at n = 7");
+}
+
+TEST(Declarations, WhatIsKnownBetterButNotDeclarableIsMeasuredOn) {
+    Declarations declarations;
+    declarations.update({verdict(ChannelState::declared, 62, 26.6, 26.9)}, 0);
+    const auto changes = declarations.update({verdict(ChannelState::measuring, 80, 26.88, 27.08)}, 0);
+    ASSERT_EQ(changes.size(), 1U);
+    EXPECT_EQ(changes[0].kind, DeclarationChange::Kind::withdrawn);
+}
+
+TEST(Declarations, NothingIsRenewedForLittleOrForWhatIsItselfNotKnown) {
+    Declarations declarations;
+    declarations.update({verdict(ChannelState::declared, 62, 26.6, 26.9)}, 0);
+    EXPECT_TRUE(declarations.update({verdict(ChannelState::declared, 80, 26.85, 26.95)}, 0).empty())
+        << "0.15 C is within the tolerance";
+    EXPECT_TRUE(declarations.update({verdict(ChannelState::measuring, 80, 26.74, 27.3)}, 0).empty())
+        << "an interval beyond the tolerance knows nothing better";
+}
+
+TEST(Declarations, ARoomThatHasMovedIsNoFaultOfADeclaration) {
+    Declarations declarations;
+    auto first = verdict(ChannelState::declared, 62, 26.6, 26.9);
+    first.room_C = 21.0;
+    declarations.update({first}, 0);
+    auto later = verdict(ChannelState::declared, 80, 26.88, 27.08);
+    later.room_C = 21.15;
+    EXPECT_TRUE(declarations.update({later}, 0).empty());
+    later.room_C = 21.0;
+    EXPECT_EQ(declarations.update({later}, 0).size(), 1U);
+}
+
+TEST(Declarations, WhatATestWasStoppedOnIsNotRenewed) {
+    Declarations declarations;
+    declarations.update({verdict(ChannelState::declared, 62, 26.6, 26.9)}, 0);
+    const auto better = verdict(ChannelState::declared, 80, 26.88, 27.08);
+    EXPECT_TRUE(declarations.update({better}, 0, Renewals::over).empty());
+    EXPECT_EQ(declarations.standing()[0].steady_state_C, 26.75);
 }
 
 TEST(Declarations, ARegimeThatBeganAfterItWithdrawsIt) {

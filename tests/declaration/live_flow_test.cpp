@@ -98,6 +98,27 @@ TEST(LiveFlow, DeadAndStuckChannelsHaveStatesOfTheirOwn) {
     EXPECT_NE(verdict->channels[0].state, ChannelState::stuck);
 }
 
+TEST(LiveFlow, ASensorWhoseNoiseStopsIsStuckThoughTheMachineRests) {
+    constexpr std::size_t scans = 1200;
+    constexpr std::size_t since = scans - 80;  // 20 min, more than four time constants after the start
+    TestWindow window = exponentials(scans, rises_C, 8);
+    std::mt19937 generator(9);
+    std::normal_distribution<double> noise_C(0.0, 0.03);
+    std::vector<double>& fine = window.channels[3].values;
+    for (double& value_C : fine) value_C = std::round((22.0 + noise_C(generator)) * 100.0) / 100.0;
+    std::vector<double>& coarse =
+        window.channels[4].values;  // noise of a fifth of a step: stands still by itself
+    for (double& value_C : coarse) value_C = std::round((29.5 + noise_C(generator) / 1.5) * 10.0) / 10.0;
+    const auto state_of = [&](std::size_t channel) {
+        return LiveFlow(quick()).identify(window, {}, sequential_for, never)->channels[channel - 1].state;
+    };
+    EXPECT_NE(state_of(3), ChannelState::stuck);
+    std::fill(fine.begin() + since, fine.end(), fine[since - 1]);
+    std::fill(coarse.begin() + since, coarse.end(), coarse[since - 1]);
+    EXPECT_EQ(state_of(3), ChannelState::stuck);
+    EXPECT_NE(state_of(4), ChannelState::stuck);
+}
+
 TEST(LiveFlow, TheCriterionBeginsAnewAfterAGapThatIsTooLongToFill) {
     TestWindow window = exponentials(400, rises_C, 7);
     std::vector<double>& samples = window.channels[1].values;

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "declaration/verdict.hpp"
@@ -11,20 +11,30 @@ namespace thermbal {
 
 /// What became of a channel from one window to the next.
 struct DeclarationChange {
-    enum class Kind { declared, withdrawn };
+    enum class Kind { declared, renewed, withdrawn };
     Kind kind = Kind::declared;
     std::string channel;
     std::string reason;
 };
+std::string_view to_string(DeclarationChange::Kind kind);
+
+/// Whether figures that a later window knows better are replaced: while a test waits for its other channels.
+/// Afterwards what it was stopped on is to be compared with what then happens.
+enum class Renewals { wanted, over };
 
 /// The declarations of a test so far. A declaration stands with the figures of the window that it was made
-/// on, until later samples contradict it: the machine's regime changed after it, or what is known now
-/// excludes what was declared then. It is then withdrawn, and the channel is measured on.
+/// on, until later samples contradict it:
+/// - the machine's regime changed after it: withdrawn, and the channel is measured on;
+/// - a later window, whose interval is within the tolerance and leaves out the declared steady state, is off
+///   from it by more than the tolerance: renewed with the figures of that window where all guards but the
+///   sweep pass on it (what the sweep said of the declaration it keeps), else withdrawn;
+/// - a later interval and the declared one are apart: withdrawn.
 class Declarations {
   public:
     /// Takes the fresh verdicts of one window. `regime_since_min`: when the regime that the window is in
     /// began, on the test's time; a declaration from before it does not stand.
-    std::vector<DeclarationChange> update(const std::vector<ChannelVerdict>& fresh, double regime_since_min);
+    std::vector<DeclarationChange> update(const std::vector<ChannelVerdict>& fresh, double regime_since_min,
+                                          Renewals renewals = Renewals::wanted);
 
     /// Declarations that an earlier life of the daemon made and stored.
     void restore(std::vector<ChannelVerdict> declared);

@@ -32,7 +32,7 @@ struct GuardOptions {
     double good_share = 0.8;            ///< of a channel's samples in the window
     double look_back_min = 4.0;        ///< "stable": the window, one this much shorter, and one twice as much
     double drift_in_tolerances = 1.0;  ///< how far the prediction may move over both
-    double slow_time_constants = 1.0;  ///< of the slowest supported time constant that must have been seen
+    double slow_time_constants = 0.7;  ///< of the slowest supported time constant that must have been seen
     double slow_time_constants_archived = 0.5;  ///< ... where earlier tests have shown the slow share
     double share_of_machines_slowest = 0.7;     ///< of the slowest time constant of all channels, for each
     double share_of_rise = 0.6;    ///< of its way to the steady state that a channel must have gone
@@ -40,7 +40,7 @@ struct GuardOptions {
     double overshoot_C = 0.5;      ///< how far a settling channel may be predicted back below where it is
     double barely_rise_in_tolerances = 1.0;
     double stuck_min = 20.0;    ///< the very same reading for so long or longer ...
-    double stuck_rise_C = 1.0;  ///< ... while the median channel moved this much
+    double stuck_rise_C = 1.0;  ///< ... while the median channel moved this much, or against its own noise
 };
 
 /// On which channels the SVR sweep, the costly step, is run.
@@ -106,8 +106,9 @@ class LiveFlow {
     bool sweep_is_wanted(const ChannelVerdict& channel) const;
     Result<ChannelSweep> swept(const TestWindow& since, const std::string& channel,
                                const ParallelFor& parallel_for, const std::function<bool()>& cancelled);
-    const Result<ArchivedEstimate>& estimate(const TestWindow& regime,
-                                             const std::vector<double>& start_level_C);
+    /// Puts what is not known yet of these windows of one regime into `estimates_`.
+    void estimate(const std::vector<TestWindow>& windows, const std::vector<double>& start_level_C,
+                  const ParallelFor& parallel_for);
 
     FlowOptions options_;
     std::map<std::pair<std::int64_t, std::size_t>, Result<ArchivedEstimate>>

@@ -14,9 +14,16 @@ struct StopDecision {
     std::vector<std::string> waiting;  ///< required channels that are still measured
 };
 
-/// The test may end when every required channel is declared or barely warming. A required channel that is
-/// stuck or dead holds the test: its steady state is not known, and a person has to say what to do (mend it,
-/// or stop by hand). REQUIRES: required[i] belongs to verdicts[i].
-StopDecision decide_stop(std::span<const ChannelVerdict> verdicts, const std::vector<bool>& required);
+struct StopOptions {
+    /// How long the last declaration has to have stood: windows that could contradict it.
+    double stands_min = 8.0;
+};
+
+/// The test may end when every required channel is declared or barely warming, and the declarations have
+/// stood for a while. A required channel that is stuck or dead holds the test: its steady state is not known,
+/// and a person has to say what to do (mend it, or stop by hand). `now_min`: the end of the newest window.
+/// REQUIRES: required[i] belongs to verdicts[i].
+StopDecision decide_stop(std::span<const ChannelVerdict> verdicts, const std::vector<bool>& required,
+                         double now_min, const StopOptions& options = {});
 
 }  // namespace thermbal

@@ -50,7 +50,9 @@ struct ChannelVerdict {
     std::string channel;
     ChannelState state = ChannelState::measuring;
     double window_end_min = std::numeric_limits<double>::quiet_NaN();
-    double declared_at_min = std::numeric_limits<double>::quiet_NaN();
+    double declared_at_min = std::numeric_limits<double>::quiet_NaN();  ///< the window of its figures
+    /// Declared without a break since; before `declared_at_min` where the figures were renewed.
+    double stands_since_min = std::numeric_limits<double>::quiet_NaN();
     int n = 0;
     double window_rmse_C = std::numeric_limits<double>::quiet_NaN();
     std::vector<double> rmse_by_n_C;  ///< [i] belongs to n = i + 1
@@ -59,6 +61,9 @@ struct ChannelVerdict {
     double steady_state_C = std::numeric_limits<double>::quiet_NaN();
     double steady_state_low_C = std::numeric_limits<double>::quiet_NaN();  ///< central 90 % interval
     double steady_state_high_C = std::numeric_limits<double>::quiet_NaN();
+    double tolerance_C = std::numeric_limits<double>::quiet_NaN();  ///< what half the interval may be
+    double room_C =
+        std::numeric_limits<double>::quiet_NaN();  ///< in which it settles there; NaN: not measured
     double equilibrium_time_min =
         std::numeric_limits<double>::quiet_NaN();  ///< since the start, 95 % of the rise
     double equilibrium_time_low_min = std::numeric_limits<double>::quiet_NaN();

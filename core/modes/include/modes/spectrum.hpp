@@ -58,8 +58,8 @@ struct SpectrumOptions {
     MixtureOptions mixture;
 
     std::size_t burn_in = 1500;  ///< Metropolis-Hastings steps that are thrown away
-    std::size_t draws = 200;     ///< states that are kept
-    std::size_t thinning = 15;   ///< steps between them
+    std::size_t draws = 400;     ///< states that are kept
+    std::size_t thinning = 30;   ///< steps between them
     /// Factor on the posterior's half width. On the finite-volume machines the errors were 0.75 posterior
     /// standard deviations (rms) while a window began with its test, and 1.0 to 1.5 after a regime change:
     /// there, and under an archive, the posterior stands as it is.
