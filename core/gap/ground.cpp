@@ -67,17 +67,50 @@ void ScreeningGround::stack() {
     stacked_.hessian = stacked_.jacobian.transpose() * stacked_.jacobian;
 }
 
-Result<Eigen::VectorXd> ScreeningGround::change_by(const Effect& effect) const {
+template <typename ChangeOfRun>
+Result<Eigen::VectorXd> ScreeningGround::stacked(ChangeOfRun whitened_change) const {
     Eigen::VectorXd change(linearisation_->samples());
     Index row = 0;
-    for (const Run& run : runs_) {
-        const auto here = run.problem.change_by(run.fit, effect);
+    for (std::size_t k = 0; k < runs_.size(); ++k) {
+        const Result<Eigen::VectorXd> here = whitened_change(k);
         if (!here) return std::unexpected(here.error());
-        const Eigen::VectorXd some = pooled(*here, run.fit.point.simulated_C.rows());
+        const Eigen::VectorXd some = pooled(*here, runs_[k].fit.point.simulated_C.rows());
         change.segment(row, some.size()) = some;
         row += some.size();
     }
     return change;
+}
+
+Result<Eigen::VectorXd> ScreeningGround::change_by(const Effect& effect) const {
+    return stacked([&](std::size_t k) { return runs_[k].problem.change_by(runs_[k].fit, effect); });
+}
+
+Result<std::vector<CourseOfReadings>> ScreeningGround::courses_from_the_beginning(
+    Effect effect, const std::string& onset) const {
+    std::vector<CourseOfReadings> courses;
+    for (const Run& run : runs_) {
+        const std::vector<double>& time_s = run.problem.data().seen.time_s;
+        effect.set_parameter(onset, time_s.front());
+        auto change_C = run.problem.reading_change_by(run.fit, effect);
+        if (!change_C) return std::unexpected(change_C.error());
+        courses.emplace_back(time_s, std::move(*change_C));
+    }
+    return courses;
+}
+
+Eigen::VectorXd ScreeningGround::change_from(const std::vector<CourseOfReadings>& courses, double onset_s,
+                                             bool remembers) const {
+    return *stacked([&](std::size_t k) -> Result<Eigen::VectorXd> {
+        const FitData& data = runs_[k].problem.data();
+        Eigen::MatrixXd change_C = Eigen::MatrixXd::Zero(courses[k].rows(), courses[k].columns());
+        for (Index row = 0; row < change_C.rows(); ++row) {
+            const double since_s = data.seen.time_s[static_cast<std::size_t>(row)] - onset_s;
+            if (since_s < 0.0) continue;
+            change_C.row(row) =
+                courses[k].at(remembers ? since_s : since_s + onset_s - data.seen.time_s.front());
+        }
+        return data.whitening(change_C);
+    });
 }
 
 }  // namespace thermbal

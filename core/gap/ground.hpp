@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "explanation.hpp"
+#include "heat_response.hpp"
 
 namespace thermbal {
 
@@ -20,6 +21,15 @@ class ScreeningGround {
     /// How the whitened readings of all runs change by an effect, one below the other.
     Result<Eigen::VectorXd> change_by(const Effect& effect) const;
 
+    /// What the readings of each run do by an effect that sets in at `onset`, a parameter of it, if it does
+    /// so at the run's beginning.
+    Result<std::vector<CourseOfReadings>> courses_from_the_beginning(Effect effect,
+                                                                     const std::string& onset) const;
+    /// As change_by, of an effect that sets in at a moment: courses of readings begin then; those of a
+    /// sensor's error, which remembers nothing, are what they would have been in the meantime.
+    Eigen::VectorXd change_from(const std::vector<CourseOfReadings>& courses, double onset_s,
+                                bool remembers) const;
+
   private:
     struct Run {
         FitProblem problem;
@@ -27,6 +37,9 @@ class ScreeningGround {
         Eigen::MatrixXd sensitivity;
     };
     void stack();
+    /// One below the other.
+    template <typename ChangeOfRun>
+    Result<Eigen::VectorXd> stacked(ChangeOfRun whitened_change) const;
 
     const Evidence* evidence_;
     const Explanation* current_;

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "candidates.hpp"
 #include "ground.hpp"
@@ -12,6 +13,7 @@ constexpr int onsets_of_a_stop = 40;
 
 std::vector<double> spread_over(const Observation& seen, int count) {
     std::vector<double> moments_s;
+    moments_s.reserve(static_cast<std::size_t>(count));
     const double begin_s = seen.time_s.front(), length_s = seen.time_s.back() - begin_s;
     for (int k = 0; k < count; ++k) moments_s.push_back(begin_s + length_s * (k + 0.5) / count);
     return moments_s;
@@ -117,6 +119,16 @@ double size_of(const SizeProbe& probe, double amplitude, const ResolvedPrior& pr
     return std::clamp(std::max(wanted, least), prior.lower, prior.upper);
 }
 
+/// The onset of a candidate that has no other shape: heat that sets in, or a sensor's error that does. What
+/// it does after one onset tells what it does after all. Null for others.
+const EffectParameterDefinition* onset_alone(const Candidate& candidate) {
+    const EffectForm& form = *candidate.form;
+    const bool linear = form.site == EffectSite::node || form.site == EffectSite::channel;
+    if (!linear || form.parameters.size() != 2) return nullptr;
+    const EffectParameterDefinition& shape = form.parameters.back();
+    return shape.is_time && !shape.when_absent ? &shape : nullptr;
+}
+
 /// Keeps the shape that gains most.
 class BestShape {
   public:
@@ -124,14 +136,21 @@ class BestShape {
         : ground_(&ground),
           prior_(resolve_prior(candidate.form->parameters.front(), ground.model())),
           best_{candidate, make_effect(*candidate.definition, *candidate.form, candidate.at, ground.model()),
-                0.0} {}
+                0.0},
+          onset_(onset_alone(candidate)) {
+        if (onset_ == nullptr) return;
+        Effect probed = best_.start;
+        probed.parameters.front().value = probe_of(prior_).value;
+        auto courses = ground.courses_from_the_beginning(std::move(probed), onset_->name);
+        if (courses) courses_ = std::move(*courses);
+    }
 
     const ResolvedPrior& prior() const { return prior_; }
     const Screened& found() const { return best_; }
 
     void look_at(Effect shape, const SizeProbe& probe) {
         shape.parameters.front().value = probe.value;
-        const auto change = ground_->change_by(shape);
+        const auto change = change_by(shape);
         if (!change) return;
         const auto gain = ground_->linearisation().gain_of(*change);
         const bool one_sided = probe.relative && prior_.lower >= 0.0;
@@ -158,10 +177,18 @@ class BestShape {
     }
 
   private:
+    Result<Eigen::VectorXd> change_by(const Effect& shape) const {
+        if (!courses_) return ground_->change_by(shape);
+        const bool remembers = best_.candidate.form->site == EffectSite::node;
+        return ground_->change_from(*courses_, shape.parameter(onset_->name), remembers);
+    }
+
     const ScreeningGround* ground_;
     ResolvedPrior prior_;
     Screened best_;
     SizeProbe best_probe_;
+    const EffectParameterDefinition* onset_;
+    std::optional<std::vector<CourseOfReadings>> courses_;  ///< of the only probe there is, by run
 };
 
 }  // namespace
