@@ -24,7 +24,8 @@ struct Odds {
         kinds;  ///< best first; probability of the kind anywhere, place of its best contender
     std::vector<std::size_t> best_of;  ///< index into Survey::contenders for each of kinds
 
-    bool something_is_missing() const { return nothing < 0.5; }
+    /// Only when that is more than twice as likely as not: who is told of an effect goes and looks for it.
+    bool something_is_missing() const { return nothing < 0.3; }
 };
 
 Odds odds_of(const Survey& survey, const Model& model, const OddsOptions& options = {});

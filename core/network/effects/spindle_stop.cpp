@@ -21,7 +21,7 @@ EffectDefinition spindle_stop_effect() {
                    .equation = "every source is 0 from from_s to from_s + duration_s",
                    // From a tool change of seconds to a break of hours.
                    .parameters = {{.name = "duration_s",
-                                   .lower = 2,
+                                   .lower = 4,
                                    .upper = 36000,
                                    .prior_centre = 240,
                                    .prior_sigma = 1.8,
