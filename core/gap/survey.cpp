@@ -78,16 +78,6 @@ double nats_of_cycling(const Evidence& evidence, const Explanation& explanation)
     return 0.5 * evidence.run.whitening(to_and_fro_C).squaredNorm();
 }
 
-/// Whether the spindle starts or its speed changes about then, in the run or in a held-out run: both have the
-/// effects at the same moments.
-bool is_near_a_known_change(double moment_s, double within_s, const Evidence& evidence) {
-    const auto in = [&](const FitData& data) {
-        return std::ranges::any_of(drive_changes_s(evidence.prior_model, data.seen.inputs),
-                                   [&](double change_s) { return std::abs(moment_s - change_s) < within_s; });
-    };
-    return in(evidence.run) || std::ranges::any_of(evidence.holdouts, in);
-}
-
 /// What sets in outside the run is only other numbers; what sets in right with a change of speed is what the
 /// model itself says too roughly of that change. A thermostat that never switches off is heat that sets in, a
 /// timer whose cycle is not seen a steady heat.
@@ -104,7 +94,9 @@ bool sets_in_on_its_own(const Evidence& evidence, const Contender& contender) {
     if (!onset_s) return true;
     if (*onset_s < seen.time_s.front() || *onset_s > seen.time_s.back()) return false;
     if (contender.candidate.form->parameters.front().is_time) return true;
-    return !is_near_a_known_change(*onset_s, bins * seen.bin_s, evidence);
+    const auto changes_s = drive_changes_s(evidence.prior_model, seen.inputs);
+    return std::ranges::none_of(
+        changes_s, [&](double change_s) { return std::abs(*onset_s - change_s) < bins * seen.bin_s; });
 }
 
 /// What describes the run itself worse than nothing does is there to please the held-out runs: a misfit of
