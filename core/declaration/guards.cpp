@@ -133,15 +133,18 @@ Guard interval_within_tolerance(const ChannelEstimate& now, const FlowOptions& o
                         now.steady_state_C, half_C, allowed_C)};
 }
 
+/// Above the room: a room that cycles moves every steady state, and no prediction is to blame.
 Guard stable_over_windows(const ChannelEstimate& now, const GuardEvidence& evidence,
                           const FlowOptions& options) {
-    double low_C = now.steady_state_C, high_C = now.steady_state_C;
+    double low_C = now.steady_state_C - evidence.now->ambient_tail_C;
+    double high_C = low_C;
     std::size_t seen = 0;
     for (const SpectrumEstimate* shorter : evidence.shorter) {
         const ChannelEstimate* before = estimate_of(shorter, now.channel);
         if (before == nullptr) continue;
-        low_C = std::min(low_C, before->steady_state_C);
-        high_C = std::max(high_C, before->steady_state_C);
+        const double above_room_C = before->steady_state_C - shorter->ambient_tail_C;
+        low_C = std::min(low_C, above_room_C);
+        high_C = std::max(high_C, above_room_C);
         ++seen;
     }
     const double allowed_C = options.guards.drift_in_tolerances * tolerance_of(now, options);
