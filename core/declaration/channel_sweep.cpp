@@ -57,9 +57,10 @@ double last_sweep_length_s(const TestWindow& window, const FlowOptions& options)
 }  // namespace
 
 TestWindow swept_window(const TestWindow& since, const FlowOptions& options) {
-    return options.sweep_when == SweepWhen::needed
-               ? window_until(since, since.start_s + last_sweep_length_s(since, options))
-               : since;
+    const TestWindow seen = options.sweep_when == SweepWhen::needed
+                                ? window_until(since, since.start_s + last_sweep_length_s(since, options))
+                                : since;
+    return coarsened(seen, options.longest_sweep_scans);
 }
 
 Result<FilteredSamples> filtered_samples(std::span<const double> samples_C, const FlowOptions& options) {

@@ -21,7 +21,7 @@ struct FilteredSamples {
 Result<FilteredSamples> filtered_samples(std::span<const double> samples_C, const FlowOptions& options);
 
 /// What of a regime's window the sweep sees: with SweepWhen::needed the longest of those that each are
-/// `sweep_growth` longer than the one before, otherwise all.
+/// `sweep_growth` longer than the one before, otherwise all; averaged down to longest_sweep_scans.
 TestWindow swept_window(const TestWindow& since, const FlowOptions& options);
 
 /// Outliers, gaps, wavelet filter, SVR sweep over n, minimum of RMSE over n, prediction at that n. `start_s`

@@ -1,6 +1,7 @@
 #include "declaration/course.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -44,12 +45,12 @@ Result<RegressionCourse> regression_course(const TestWindow& window, const SvrPr
         return fail(NextStep::refuse_input, fmt::format("{}: no regression on this window", channel));
     const auto filtered = filtered_samples(samples->values, options);
     if (!filtered) return std::unexpected(filtered.error());
-    auto run = predict(filtered->temperature_C, static_cast<std::size_t>(at.n), at.C, at.sigma,
-                       scans_after + regime.window.scans - seen.scans, options.sweep);
+    const double until_s = regime.window.end_s() + static_cast<double>(scans_after) * regime.window.period_s;
+    const auto horizon = static_cast<std::size_t>(std::lround((until_s - seen.end_s()) / seen.period_s));
+    auto run = predict(filtered->temperature_C, static_cast<std::size_t>(at.n), at.C, at.sigma, horizon,
+                       options.sweep);
     if (!run) return std::unexpected(run.error());
-    const double period_s = regime.window.period_s;
-    RegressionCourse course{regime.window.start_s + static_cast<double>(filtered->first) * period_s, period_s,
-                            std::move(run->window_C)};
+    RegressionCourse course{seen.time_s(filtered->first), seen.period_s, std::move(run->window_C)};
     std::ranges::copy(run->predicted_C, std::back_inserter(course.temperature_C));
     return course;
 }

@@ -26,6 +26,8 @@ std::pair<std::int64_t, std::size_t> window_key(const TestWindow& window) {
 Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::set<std::string>& settled,
                                          const ParallelFor& parallel_for,
                                          const std::function<bool()>& cancelled) {
+    if (window.scans > options_.longest_window_scans)
+        return identify(coarsened(window, options_.longest_window_scans), settled, parallel_for, cancelled);
     if (!options_.ambient.empty() && window.channel(options_.ambient) == nullptr) {
         return fail(NextStep::refuse_input,
                     fmt::format("the ambient channel {} is not in the test", options_.ambient));
@@ -51,6 +53,7 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
         if (regime.began_with.empty()) verdict.spectrum = archived(now->estimate);
     }
 
+    std::optional<TestWindow> seen;  // by the sweeps
     for (const Column& column : window.channels) {
         if (column.name == options_.ambient) continue;
         ChannelVerdict channel = begin_verdict(column, verdict.window_end_min);
@@ -63,7 +66,8 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
             ask_shared_modes(channel, evidence, options_);
         }
         if (!settled.contains(channel.channel) && sweep_is_wanted(channel)) {
-            const auto sweep = swept(since, channel.channel, parallel_for, cancelled);
+            if (!seen) seen = swept_window(since, options_);
+            const auto sweep = swept(*seen, channel.channel, parallel_for, cancelled);
             if (cancelled()) return fail(NextStep::stop, "cancelled");
             ask_sweep(channel, sweep, options_);
         }
@@ -94,10 +98,9 @@ bool LiveFlow::sweep_is_wanted(const ChannelVerdict& channel) const {
     return false;
 }
 
-Result<ChannelSweep> LiveFlow::swept(const TestWindow& since, const std::string& channel,
+Result<ChannelSweep> LiveFlow::swept(const TestWindow& seen, const std::string& channel,
                                      const ParallelFor& parallel_for,
                                      const std::function<bool()>& cancelled) {
-    const TestWindow seen = swept_window(since, options_);
     const std::pair key = window_key(seen);
     const auto known = sweeps_.find(channel);
     if (known != sweeps_.end() && known->second.window == key) return known->second.result;

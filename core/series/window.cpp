@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "base/median.hpp"
@@ -23,6 +24,17 @@ TestWindow slice(const TestWindow& window, std::size_t first, std::size_t count)
     for (const Column& column : window.channels) part.channels.push_back(cut(column));
     for (const Column& column : window.inputs) part.inputs.push_back(cut(column));
     return part;
+}
+
+double mean_of_good(std::span<const double> values) {
+    double sum = 0.0;
+    std::size_t good = 0;
+    for (const double value : values) {
+        if (!std::isfinite(value)) continue;
+        sum += value;
+        ++good;
+    }
+    return good == 0 ? no_value : sum / static_cast<double>(good);
 }
 
 /// Times on the grid come out of a product; a scan exactly at the limit must not be lost to rounding.
@@ -97,6 +109,27 @@ TestWindow window_from(const TestWindow& window, double from_s) {
     const double skipped = std::ceil((from_s - window.start_s) / window.period_s - grid_slack);
     const auto first = static_cast<std::size_t>(std::clamp(skipped, 0.0, static_cast<double>(window.scans)));
     return slice(window, first, window.scans - first);
+}
+
+TestWindow coarsened(const TestWindow& window, std::size_t most_scans) {
+    if (window.scans <= most_scans || most_scans == 0) return window;
+    const std::size_t group = (window.scans + most_scans - 1) / most_scans;
+    const auto scans_of = static_cast<double>(group);
+    TestWindow coarse{window.start_s + 0.5 * (scans_of - 1.0) * window.period_s,
+                      scans_of * window.period_s,
+                      window.scans / group,
+                      {},
+                      {}};
+    for (const Column& column : window.channels) {
+        std::vector<double>& means = coarse.channels.emplace_back(Column{column.name, {}}).values;
+        for (std::size_t k = 0; k < coarse.scans; ++k)
+            means.push_back(mean_of_good(std::span(column.values).subspan(k * group, group)));
+    }
+    for (const Column& column : window.inputs) {
+        std::vector<double>& newest = coarse.inputs.emplace_back(Column{column.name, {}}).values;
+        for (std::size_t k = 0; k < coarse.scans; ++k) newest.push_back(column.values[(k + 1) * group - 1]);
+    }
+    return coarse;
 }
 
 }  // namespace thermbal

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -61,6 +63,23 @@ std::string test_text(const json& answer) {
     const std::string model = text(answer, "model");
     return fmt::format("test {} is {}{}\n", fixed(number(answer, "test"), 0), text(answer, "state"),
                        model.empty() ? "" : fmt::format(", compared with model \"{}\"", printable(model)));
+}
+
+/// One answer holds only so many samples: asks for the scans behind it until there are `limit` or no more.
+Result<json> with_further_scans(SocketClient& client, json params, json samples) {
+    std::size_t wanted = params["limit"].get<std::size_t>();
+    std::size_t got = list(samples, "scans").size();
+    while (got > 0 && got < wanted) {
+        const double last = number(list(samples, "scans").back(), "scan").value_or(0.0);
+        wanted -= got;
+        params["limit"] = wanted;
+        params["from_scan"] = static_cast<std::int64_t>(last) + 1;
+        auto next = client.ask("samples", params);
+        if (!next) return next;
+        got = list(*next, "scans").size();
+        for (const json& scan : list(*next, "scans")) samples["scans"].push_back(scan);
+    }
+    return samples;
 }
 
 std::int64_t newest_id(const json& events, std::int64_t otherwise) {
@@ -154,9 +173,14 @@ int run_annotate(const AskOptions& ask, const std::string& message, const std::s
 }
 
 int run_samples(const AskOptions& ask, const SamplesOptions& options) {
+    auto client = SocketClient::connect(ask.socket);
+    if (!client) return report_run_time(client.error());
     json params = without_empty({{"channel", options.channel}, {"limit", options.limit}});
     if (options.from_scan) params["from_scan"] = *options.from_scan;
-    return ask_and_print(ask, "samples", params, samples_text);
+    auto samples = client->ask("samples", params);
+    if (samples) samples = with_further_scans(*client, params, std::move(*samples));
+    if (!samples) return report_run_time(samples.error());
+    return ask.json ? print_json(*samples) : print_text(samples_text(*samples));
 }
 
 int run_curve(const AskOptions& ask, const std::string& channel) {

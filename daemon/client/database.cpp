@@ -80,15 +80,17 @@ Result<Reader> open_database(const DatabaseOptions& options) {
     return Reader::open(*path);
 }
 
-int run_tests(const DatabaseOptions& options) {
+int run_tests(const DatabaseOptions& options, std::int64_t limit) {
     const auto reader = open_database(options);
     if (!reader) return report_error(reader.error());
-    const auto tests = reader->tests();
+    auto tests = reader->tests(limit + 1);
     if (!tests) return report_error(tests.error());
+    const bool has_older = static_cast<std::int64_t>(tests->size()) > limit;
+    if (has_older) tests->pop_back();
     if (options.ask.json) {
         json rows = json::array();
         for (const StoredTest& test : *tests) rows.push_back(test_json(test));
-        return print_json({{"tests", std::move(rows)}});
+        return print_json({{"tests", std::move(rows)}, {"has_older", has_older}});
     }
     if (tests->empty()) return print_text("no tests\n");
     TextTable table({{"id", true},
@@ -106,7 +108,9 @@ int run_tests(const DatabaseOptions& options) {
                    minutes(static_cast<double>(test.last_scan.value_or(0)) * test.record.period_s / 60.0),
                    test.stop_reason});
     }
-    return print_text(table.str());
+    return print_text(
+        table.str() +
+        (has_older ? "and older ones: --limit asks for more than " + std::to_string(limit) + "\n" : ""));
 }
 
 int run_export(const DatabaseOptions& options, std::optional<std::int64_t> test, const std::string& csv) {

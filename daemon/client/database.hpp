@@ -25,8 +25,8 @@ Result<TestId> wanted_test(const Reader& reader, std::optional<std::int64_t> tes
 /// "2026-11-22 06:35:00" in the zone of this machine.
 std::string local_time(std::int64_t wall_ns);
 
-/// The stored tests, newest first.
-int run_tests(const DatabaseOptions& options);
+/// The newest stored tests, newest first, at most `limit`.
+int run_tests(const DatabaseOptions& options, std::int64_t limit);
 
 /// A test (without an id the newest) as the CSV of INTERFACES, into a file or "-".
 int run_export(const DatabaseOptions& options, std::optional<std::int64_t> test, const std::string& csv);

@@ -23,9 +23,13 @@ void add_json_flag(CLI::App& command, bool& json) {
 void add_tests(CLI::App& app, int& status) {
     CLI::App& command = add_command(app, "tests", "the stored tests, newest first");
     const auto options = std::make_shared<DatabaseOptions>();
+    const auto limit = std::make_shared<std::int64_t>(500);
+    command.add_option("--limit", *limit, "at most so many, the newest")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1'000'000));
     add_database_flags(command, *options);
     add_json_flag(command, options->ask.json);
-    command.callback([&status, options] { status = run_tests(*options); });
+    command.callback([&status, options, limit] { status = run_tests(*options, *limit); });
 }
 
 void add_export(CLI::App& app, int& status) {

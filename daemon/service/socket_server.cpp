@@ -464,7 +464,7 @@ void SocketServer::publish(std::string_view topic, const json& params) {
     for (auto& [fd, client] : parts.clients) {
         if (!client.follows(topic)) continue;
         if (line.empty()) line = json_rpc::notification(topic, params);
-        if (client.published_unread + line.size() > parts.options.max_backlog_bytes) {
+        if (client.published_unread > parts.options.max_backlog_bytes) {
             parts.drop(client);
             continue;
         }

@@ -199,8 +199,8 @@ const std::filesystem::path& Reader::path() const {
     return database_->path();
 }
 
-Result<std::vector<StoredTest>> Reader::tests() const {
-    return tests_where(*database_, "ORDER BY id DESC");
+Result<std::vector<StoredTest>> Reader::tests(std::int64_t most) const {
+    return tests_where(*database_, "ORDER BY id DESC LIMIT ?", most);
 }
 
 Result<StoredTest> Reader::test(TestId id) const {
@@ -221,9 +221,17 @@ Result<std::optional<StoredTest>> Reader::newest_test() const {
 }
 
 Result<std::vector<ScanRecord>> Reader::scans(TestId id, std::int64_t from_scan, std::int64_t to_scan) const {
-    sqlite::Transaction snapshot(*database_, sqlite::Transaction::Kind::read);
-    if (!snapshot.begun()) return std::unexpected(snapshot.begun().error());
     std::vector<ScanRecord> scans;
+    const auto read =
+        each_scan(id, from_scan, to_scan, [&scans](ScanRecord& scan) { scans.push_back(std::move(scan)); });
+    if (!read) return std::unexpected(read.error());
+    return scans;
+}
+
+Result<void> Reader::each_scan(TestId id, std::int64_t from_scan, std::int64_t to_scan,
+                               const std::function<void(ScanRecord& scan)>& take) const {
+    sqlite::Transaction snapshot(*database_, sqlite::Transaction::Kind::read);
+    if (!snapshot.begun()) return snapshot.begun();
     auto rows = database_->query(
         "SELECT scan, status, time_s, scheduled_ns, started_ns, finished_ns, wall_ns FROM scans "
         "WHERE test_id = ? AND scan BETWEEN ? AND ? ORDER BY scan",
@@ -247,11 +255,11 @@ Result<std::vector<ScanRecord>> Reader::scans(TestId id, std::int64_t from_scan,
         scan.wall_ns = rows.integer(6);
         samples.of(scan.scan, [&](const auto& row) { scan.samples.push_back(sample_in(row, 1)); });
         inputs.of(scan.scan, [&](const auto& row) { scan.inputs.push_back({row.text(1), row.real(2)}); });
-        scans.push_back(std::move(scan));
+        take(scan);
     }
     for (const auto& status : {rows.status(), samples.status(), inputs.status()})
-        if (!status) return std::unexpected(status.error());
-    return scans;
+        if (!status) return status;
+    return {};
 }
 
 Result<RecordedTest> Reader::recorded_test(TestId id) const {

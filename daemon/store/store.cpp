@@ -493,9 +493,6 @@ Result<std::optional<ResumedTest>> Store::resume() const {
     if (!*test) return std::optional<ResumedTest>{};
     ResumedTest resumed;
     resumed.test = std::move(**test);
-    auto scans = read().scans(resumed.test.id);
-    if (!scans) return std::unexpected(scans.error());
-    resumed.scans = std::move(*scans);
     auto declarations = read().declarations(resumed.test.id);
     if (!declarations) return std::unexpected(declarations.error());
     resumed.declarations = std::move(*declarations);

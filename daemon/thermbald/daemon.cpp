@@ -38,8 +38,9 @@ void Daemon::take_scan(Scan& scan) {
         if (is_measuring(test_.state) && identification_is_due(scan.scan)) {
             test_.identifying = true;
             test_.submitted_scan = scan.scan;
-            identifier_->submit(
-                {generation_, scan.scan, test_.window, test_.declarations.declared_channels(), test_.flow});
+            identifier_->submit({generation_, scan.scan,
+                                 coarsened(test_.window, test_.flow->longest_window_scans),
+                                 test_.declarations.declared_channels(), test_.flow});
         }
         if (is_measuring(test_.state)) compare_with_model(scan.scan);
         if (is_measuring(test_.state) && over_time(scan)) {

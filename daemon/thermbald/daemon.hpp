@@ -115,7 +115,9 @@ class Daemon {
     Result<TestPlan> plan_of(const nlohmann::json& params) const;
     Result<TestId> start_test(TestPlan plan);
     TestRecord test_record(const std::string& name, const std::string& machine, const TestModel* model) const;
-    void resume(ResumedTest resumed);
+    Result<std::optional<ResumedTest>> take_up_test();
+    Result<void> restore(const ResumedTest& resumed);
+    void go_on_with(const ResumedTest& resumed);
     void resume_model(const TestRecord& record);
     void set_input(const KnownInput& input);
     void follow_grid(Grid grid, std::int64_t first_scan);

@@ -184,10 +184,10 @@ Result<void> Daemon::attach() {
 }
 
 Result<void> Daemon::run() {
-    auto resumed = storage_.store().resume();
+    auto resumed = take_up_test();
     if (!resumed && resumed.error().next == NextStep::stop) {
         leave_damaged_database();
-        resumed = storage_.store().resume();
+        resumed = take_up_test();
     }
     if (!resumed) return std::unexpected(resumed.error());
     if (const auto& set_aside = storage_.store().set_aside()) {
@@ -196,7 +196,7 @@ Result<void> Daemon::run() {
                           set_aside->string()));
     }
     if (*resumed) {
-        resume(std::move(**resumed));
+        go_on_with(**resumed);
     } else if (options_.config.test.start == TestConfig::Start::automatic) {
         auto plan = plan_of(nlohmann::json::object());
         if (!plan) return std::unexpected(plan.error());

@@ -92,6 +92,13 @@ double first_good(const std::vector<double>& values) {
     return found == values.end() ? no_value : *found;
 }
 
+/// So many samples are read and written in 30 ms, during which no other event is served.
+std::int64_t most_scans(std::size_t channels) {
+    constexpr std::size_t most_samples = 20'000;
+    return static_cast<std::int64_t>(
+        std::max<std::size_t>(most_samples / std::max<std::size_t>(channels, 1), 1));
+}
+
 /// Evenly thinned to at most `count` values, for a sparkline.
 json thinned(const std::vector<double>& values, std::size_t count) {
     json list = json::array();
@@ -236,8 +243,9 @@ Result<json> Daemon::samples_json(const json& params) const {
     if (!wanted->empty() && std::ranges::find(channels, *wanted, &ChannelConfig::name) == channels.end()) {
         return bad_param(fmt::format("channel: there is no {}", *wanted));
     }
-    const auto scans = storage_.store().read().scans(test_.id, std::max<std::int64_t>(*from_scan, 0),
-                                                     *from_scan + *limit - 1);
+    const std::int64_t first = std::clamp<std::int64_t>(*from_scan, 0, std::int64_t{1} << 40);
+    const auto scans = storage_.store().read().scans(
+        test_.id, first, first + std::min(*limit, most_scans(channels.size())) - 1);
     if (!scans) return std::unexpected(scans.error());
     json rows = json::array();
     for (const ScanRecord& scan : *scans) {

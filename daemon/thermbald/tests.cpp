@@ -121,9 +121,19 @@ void Daemon::begin_window(double period_s) {
     alarm_watch_.emplace(alarm_limits(options_.config), options_.config.channels.size());
 }
 
-/// Goes on with a test that was open when the daemon ended: the same test, the scans that are stored, the
-/// grid where it is now. What lies between becomes missed scans.
-void Daemon::resume(ResumedTest resumed) {
+/// The test that was open when the daemon ended, if there was one, with the scans that are stored. After an
+/// error there is none.
+Result<std::optional<ResumedTest>> Daemon::take_up_test() {
+    auto resumed = storage_.store().resume();
+    if (!resumed || !*resumed) return resumed;
+    if (auto restored = restore(**resumed); !restored) {
+        test_ = LiveTest{};
+        return std::unexpected(restored.error());
+    }
+    return resumed;
+}
+
+Result<void> Daemon::restore(const ResumedTest& resumed) {
     const StoredTest& stored = resumed.test;
     const TestRecord& record = stored.record;
     test_ = LiveTest{};
@@ -145,24 +155,24 @@ void Daemon::resume(ResumedTest resumed) {
     }
 
     begin_window(record.period_s);
-    prepare_flow(record.machine);
-    resume_model(record);
-    const auto position = [&](const std::string& name) {
-        const auto& channels = options_.config.channels;
-        return static_cast<std::size_t>(std::ranges::find(channels, name, &ChannelConfig::name) -
-                                        channels.begin());
-    };
-    for (const ScanRecord& scan : resumed.scans) {
-        Scan again{.scan = scan.scan, .samples = std::vector<Sample>(options_.config.channels.size())};
-        for (std::size_t i = 0; i < scan.samples.size(); ++i) {
-            const std::size_t channel = position(record.channels[i].name);
-            if (channel < again.samples.size()) again.samples[channel] = scan.samples[i];
+    // Where each stored channel is now; those that are no more have no place.
+    std::vector<std::size_t> position;
+    const auto& channels = options_.config.channels;
+    for (const ChannelRecord& channel : record.channels) {
+        const auto found = std::ranges::find(channels, channel.name, &ChannelConfig::name);
+        position.push_back(static_cast<std::size_t>(found - channels.begin()));
+    }
+    const auto read = storage_.store().read().each_scan(stored.id, 0, INT64_MAX, [&](ScanRecord& scan) {
+        Scan again{.scan = scan.scan, .samples = std::vector<Sample>(channels.size())};
+        for (std::size_t i = 0; i < std::min(scan.samples.size(), position.size()); ++i) {
+            if (position[i] < channels.size()) again.samples[position[i]] = scan.samples[i];
         }
         for (const InputValue& input : scan.inputs) set_input({input.name, input.value});
         grow_window(again);
         // Only so that a limit goes on where it was: what was an alarm has ended the test then.
         alarm_watch_->take(test_.grid.time_s(again.scan), again.samples);
-    }
+    });
+    if (!read) return read;
     std::vector<ChannelVerdict> verdicts;
     for (const IdentificationRecord& identification : resumed.identifications) {
         auto json = nlohmann::json::parse(identification.verdict_json, nullptr, false);
@@ -172,6 +182,15 @@ void Daemon::resume(ResumedTest resumed) {
         test_.submitted_scan = identification.window_end_scan;
     }
     test_.declarations.restore(std::move(verdicts));
+    return {};
+}
+
+/// On the grid where it is now; what lies between it and the stored scans becomes missed scans.
+void Daemon::go_on_with(const ResumedTest& resumed) {
+    const TestRecord& record = resumed.test.record;
+    prepare_flow(record.machine);
+    resume_model(record);
+    const std::int64_t last_scan = resumed.test.last_scan.value_or(-1);
     follow_grid(test_.grid, last_scan + 1);
     const std::int64_t missed = test_.grid.scan_at(clock_.monotonic_ns()) - last_scan - 1;
     event("resumed", fmt::format("test {} \"{}\" goes on: {} scans are stored, about {} were missed",

@@ -120,7 +120,8 @@ void add_line_flags(CLI::App& app, Flags& flags) {
     app.add_option("--word-order", flags.word_order, "Of 32-bit values: abcd, cdab, badc, dcba")
         ->capture_default_str()
         ->group("Line");
-    app.add_option("--units", flags.units, "Channels of each unit, e.g. 16 or 8,8 or 4,4,4,4")
+    app.add_option("--units", flags.units,
+                   "Channels of each unit, e.g. 16 or 8,8 or 4,4,4,4; 16,16: two units on the same sensors")
         ->capture_default_str()
         ->group("Line");
     app.add_option("--first-unit", flags.first_unit, "Id of the first unit; the others follow")
@@ -313,12 +314,14 @@ Result<std::vector<ModuleUnit>> parse_units(const std::string& text, int first_i
         }
         const int id = first_id + static_cast<int>(units.size());
         if (id > 247) return refuse(fmt::format("--units '{}': unit ids end at 247", text));
+        if (channels == all_channels) channels = 0;  // one more module on the same sensors
         units.push_back({.id = static_cast<std::uint8_t>(id), .first_channel = channels, .channels = count});
         channels += count;
-    }
-    if (channels > all_channels) {
-        return refuse(
-            fmt::format("--units '{}' are {} channels; there are {}", text, channels, all_channels));
+        if (channels > all_channels) {
+            return refuse(
+                fmt::format("--units '{}' are {} channels; there are {}, and a unit ends with the last", text,
+                            channels, all_channels));
+        }
     }
     return units;
 }

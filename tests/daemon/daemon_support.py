@@ -77,13 +77,17 @@ class Daemon:
                 self.process.wait()
         self.log.close()
 
-    def call(self, method, **params):
+    def answer(self, method, **params):
+        """The line that the daemon answers with."""
         with socket.socket(socket.AF_UNIX) as connection:
             connection.settimeout(30)
             connection.connect(f"{self.folder}/daemon.sock")
             request = {"jsonrpc": "2.0", "id": 1, "method": method, "params": params}
             connection.sendall(json.dumps(request).encode() + b"\n")
-            reply = json.loads(connection.makefile().readline())
+            return connection.makefile().readline()
+
+    def call(self, method, **params):
+        reply = json.loads(self.answer(method, **params))
         if "error" in reply:
             raise RuntimeError(reply["error"]["message"])
         return reply["result"]

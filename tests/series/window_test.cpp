@@ -46,6 +46,24 @@ TEST(Window, UntilAndFromKeepTheScanAtTheLimit) {
     EXPECT_EQ(window_from(window, 1e9).scans, 0U);
 }
 
+TEST(Window, CoarsenedHoldsMeansOfGoodNeighboursAtTheirMiddle) {
+    const TestWindow window{30.0,
+                            15.0,
+                            8,
+                            {{"T1", {1, 2, 6, no_value, 5, no_value, no_value, 9}}},
+                            {{"spindle_rpm", {0, 0, 5000, 5000, 5000, 0, 0, 0}}}};
+    const TestWindow coarse = coarsened(window, 3);  // three each; the last two are no group
+    EXPECT_EQ(coarse.scans, 2U);
+    EXPECT_EQ(coarse.period_s, 45.0);
+    EXPECT_EQ(coarse.start_s, 45.0);
+    EXPECT_THAT(coarse.channels[0].values, ElementsAre(DoubleEq(3.0), DoubleEq(5.0)));
+    EXPECT_THAT(coarse.inputs[0].values, ElementsAre(5000.0, 0.0));
+    EXPECT_THAT(coarsened(window, 4).channels[0].values,
+                ElementsAre(DoubleEq(1.5), DoubleEq(6.0), DoubleEq(5.0), DoubleEq(9.0)));
+    EXPECT_EQ(coarsened(window, 8).scans, 8U);
+    EXPECT_EQ(coarsened(window, 8).period_s, 15.0);
+}
+
 TEST(Quality, NamesReadBack) {
     for (int i = 0; i <= static_cast<int>(Quality::gap); ++i) {
         const auto quality = static_cast<Quality>(i);

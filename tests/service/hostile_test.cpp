@@ -172,6 +172,24 @@ TEST_F(HostileTest, ASubscriberThatDoesNotReadIsDroppedAndCostsNobodyAnything) {
     EXPECT_TRUE(slow.closed_by_server());
 }
 
+TEST_F(HostileTest, ANotificationLongerThanTheBacklogReachesWhoReads) {
+    auto small = options();
+    small.max_backlog_bytes = 1000;
+    const RunningServer server(small);
+    LineClient subscriber(path);
+    LineClient publisher(path);
+    subscriber.ask(R"({"jsonrpc":"2.0","id":1,"method":"subscribe"})");
+    const std::string publish =
+        R"({"jsonrpc":"2.0","id":2,"method":"publish","params":{"topic":"predictions","params":")" +
+        std::string(50'000, 'x') + "\"}}";
+    for (int i = 0; i < 5; ++i) {
+        ASSERT_TRUE(publisher.ask(publish).contains("result"));
+        const auto line = subscriber.line();
+        ASSERT_TRUE(line.has_value());
+        EXPECT_GT(line->size(), 50'000U);
+    }
+}
+
 TEST_F(HostileTest, AClientThatNeverReadsItsRepliesKeepsTheLoopIdle) {
     const RunningServer server(options());
     LineClient client(path);

@@ -88,7 +88,7 @@ TEST(KillTest, NoAcknowledgedScanIsLostOrDoubled) {
     const auto resumed = store.resume();
     ASSERT_OK(resumed);
     ASSERT_TRUE(resumed->has_value());
-    const auto& scans = (*resumed)->scans;
+    const auto scans = store.read().scans((*resumed)->test.id).value();
     ASSERT_GE(scans.size(), static_cast<std::size_t>(highest + 1));
     for (std::size_t k = 0; k < scans.size(); ++k) {
         ASSERT_EQ(scans[k].scan, static_cast<std::int64_t>(k));

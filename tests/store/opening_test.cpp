@@ -107,8 +107,9 @@ TEST_F(OpeningTest, AnOlderDatabaseIsBroughtUpWithAllItHolds) {
     ASSERT_OK(resumed);
     ASSERT_TRUE(resumed->has_value());
     EXPECT_EQ((*resumed)->test.record.name, "from version 1");
-    ASSERT_EQ((*resumed)->scans.size(), 2U);
-    EXPECT_EQ((*resumed)->scans[1].samples[1].quality, Quality::open);
+    const auto scans = store.read().scans((*resumed)->test.id).value();
+    ASSERT_EQ(scans.size(), 2U);
+    EXPECT_EQ(scans[1].samples[1].quality, Quality::open);
     ASSERT_OK(store.append_scan((*resumed)->test.id, scan_record(2, 2)));
     EXPECT_THAT(*store.read().archive(""), IsEmpty());
     ASSERT_OK(store.record_archive({}));
@@ -327,7 +328,7 @@ class NewDatabaseTest : public OpeningTest {
         const auto resumed = store.resume();
         ASSERT_OK(resumed);
         ASSERT_TRUE(*resumed);
-        EXPECT_EQ((*resumed)->scans.size(), 20U);
+        EXPECT_EQ(store.read().scans((*resumed)->test.id)->size(), 20U);
         EXPECT_FALSE(std::filesystem::exists(fresh));
     }
 };

@@ -377,7 +377,7 @@ TEST_F(StoreTest, ARestartGoesOnWithTheOpenTest) {
     EXPECT_EQ((*resumed)->test.record.channels.size(), 16U);
     EXPECT_EQ((*resumed)->test.record.boot_id, "4a0c");
     EXPECT_EQ((*resumed)->test.last_scan, 4);
-    EXPECT_EQ((*resumed)->scans.size(), 5U);
+    EXPECT_EQ(store.read().scans(id)->size(), 5U);
     EXPECT_EQ((*resumed)->identifications.size(), 1U);
     const std::vector<ScanRecord> gap = {missed_scan(5), missed_scan(6)};
     ASSERT_OK(store.append_scans(id, gap));

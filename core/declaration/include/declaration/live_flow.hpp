@@ -71,6 +71,11 @@ struct FlowOptions {
     /// before, counted from its shortest. On a noisy channel a sweep takes seconds, and 4 min more of 100
     /// change no curve.
     double sweep_growth = 0.04;
+    /// A longer window is averaged down to so many samples before the sweep, whose time and memory grow with
+    /// them. 13 h at 15 s.
+    std::size_t longest_sweep_scans = 3200;
+    /// And before all else to so many: 8 days at 15 s, 14 h at 1 s.
+    std::size_t longest_window_scans = 50'000;
 };
 
 /// All structural channels at the end of one window, in the window's order.
@@ -104,7 +109,7 @@ class LiveFlow {
   private:
     void forget_before(double window_end_s, double period_s);
     bool sweep_is_wanted(const ChannelVerdict& channel) const;
-    Result<ChannelSweep> swept(const TestWindow& since, const std::string& channel,
+    Result<ChannelSweep> swept(const TestWindow& seen, const std::string& channel,
                                const ParallelFor& parallel_for, const std::function<bool()>& cancelled);
     /// Puts what is not known yet of these windows of one regime into `estimates_`.
     void estimate(const std::vector<TestWindow>& windows, const std::vector<double>& start_level_C,

@@ -66,4 +66,9 @@ TestWindow window_until(const TestWindow& window, double until_s);
 /// The scans of a window at times >= from_s.
 TestWindow window_from(const TestWindow& window, double from_s);
 
+/// At most `most_scans` scans, each the mean of the good samples of k neighbours at the middle of their
+/// times, with the smallest k that does (inputs: the newest value); an incomplete last group is left out. A
+/// window that is short enough as it is.
+TestWindow coarsened(const TestWindow& window, std::size_t most_scans);
+
 }  // namespace thermbal

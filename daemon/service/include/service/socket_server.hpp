@@ -47,7 +47,9 @@ struct SocketServerOptions {
     std::size_t max_requests_per_50_ms = 50;
     std::size_t max_reply_bytes = 8UL * 1024 * 1024;
     std::size_t max_pending_bytes = 64UL * 1024 * 1024;  ///< unread replies of all clients together
-    std::size_t max_backlog_bytes = 1024UL * 1024;  ///< unread notifications at which a subscriber is dropped
+    /// Unread notifications at which a subscriber is dropped when the next one comes. One alone may be
+    /// longer: the predictions of 1024 channels are some megabytes.
+    std::size_t max_backlog_bytes = 1024UL * 1024;
 };
 
 /// JSON-RPC 2.0 over a Unix stream socket, one document a line. Requests may be pipelined; replies come in

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,8 +31,8 @@ class Reader {
 
     const std::filesystem::path& path() const;
 
-    /// Newest first.
-    Result<std::vector<StoredTest>> tests() const;
+    /// Newest first, at most `most` of them.
+    Result<std::vector<StoredTest>> tests(std::int64_t most = INT64_MAX) const;
     Result<StoredTest> test(TestId id) const;
     /// The test that is running or declared, if there is one.
     Result<std::optional<StoredTest>> open_test() const;
@@ -40,6 +41,11 @@ class Reader {
     /// Scans with from_scan <= scan <= to_scan, ascending.
     Result<std::vector<ScanRecord>> scans(TestId id, std::int64_t from_scan = 0,
                                           std::int64_t to_scan = INT64_MAX) const;
+
+    /// The same, one after the other: for a long test, which would fill the memory. `take` may move from its
+    /// argument. After an error some may have been taken.
+    Result<void> each_scan(TestId id, std::int64_t from_scan, std::int64_t to_scan,
+                           const std::function<void(ScanRecord& scan)>& take) const;
 
     /// The good values as they were recorded, one row a stored scan (missed ones too, empty).
     Result<RecordedTest> recorded_test(TestId id) const;

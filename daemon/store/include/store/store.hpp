@@ -15,10 +15,10 @@
 
 namespace thermbal {
 
-/// A test that was open when the daemon ended, with everything it needs to go on.
+/// A test that was open when the daemon ended, with everything it needs to go on but its scans
+/// (Reader::each_scan): those of a week may be millions of samples.
 struct ResumedTest {
     StoredTest test;
-    std::vector<ScanRecord> scans;
     std::vector<DeclarationRecord> declarations;
     std::vector<IdentificationRecord> identifications;  ///< the newest of each channel
 };
