@@ -244,6 +244,8 @@ bool is_stuck(const GuardEvidence& evidence, const GuardOptions& options) {
 }  // namespace
 
 Regime current_regime(const TestWindow& window, const FlowOptions& options) {
+    if (window.scans > options.longest_window_scans)
+        return current_regime(coarsened(window, options.longest_window_scans), options);
     const RegimeReport report = find_regime_changes(window, options.ambient, options.regime);
     Regime regime{window.start_s, "", report.last_change_s, {}, {}};
     for (const RegimeChange& change : report.changes) {

@@ -26,8 +26,6 @@ std::pair<std::int64_t, std::size_t> window_key(const TestWindow& window) {
 Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::set<std::string>& settled,
                                          const ParallelFor& parallel_for,
                                          const std::function<bool()>& cancelled) {
-    if (window.scans > options_.longest_window_scans)
-        return identify(coarsened(window, options_.longest_window_scans), settled, parallel_for, cancelled);
     if (!options_.ambient.empty() && window.channel(options_.ambient) == nullptr) {
         return fail(NextStep::refuse_input,
                     fmt::format("the ambient channel {} is not in the test", options_.ambient));

@@ -136,6 +136,23 @@ TEST(LiveFlow, TheCriterionBeginsAnewAfterAGapThatIsTooLongToFill) {
     EXPECT_TRUE(std::isnan(verdict->channels[0].svr.equilibrium_time_min));
 }
 
+TEST(LiveFlow, AWindowThatIsTooLongIsIdentifiedFromItsMeans) {
+    const TestWindow whole = exponentials(1600, rises_C, 5);
+    FlowOptions options = quick();
+    options.longest_window_scans = 600;
+    options.longest_sweep_scans = 200;
+    options.sweep_when = SweepWhen::always;
+    const auto verdict = LiveFlow(options).identify(whole, {}, sequential_for, never);
+    ASSERT_TRUE(verdict) << verdict.error().message;
+    EXPECT_EQ(verdict->window_end_min, whole.end_s() / 60.0);
+    for (std::size_t c = 0; c < rises_C.size(); ++c) {
+        const ChannelVerdict& channel = verdict->channels[c];
+        EXPECT_NEAR(channel.steady_state_C, 18.0 + rises_C[c], 0.1) << channel.channel;
+        EXPECT_NEAR(channel.svr.steady_state_C, 18.0 + rises_C[c], 0.2) << channel.channel;
+        EXPECT_EQ(channel.rmse_by_n_C.size(), options.sweep.last_lag);
+    }
+}
+
 TEST(LiveFlow, SaysWhatIsMissing) {
     const TestWindow window = exponentials(40, rises_C, 6);
     FlowOptions options = quick();
