@@ -120,8 +120,11 @@ def measured_scans(daemon, scale, count):
             "database_bytes_a_scan": (database_bytes(daemon.folder) - bytes_before) / scans}
 
 
-def wait_for_identification(daemon):
-    daemon.wait_for("health", lambda health: health["identification_s"]["count"] > 0, "an identification", 900)
+def wait_for_identification(daemon, seconds):
+    """Gives up after a while: on a busy machine, identification is last."""
+    deadline = time.monotonic() + seconds
+    while daemon.call("health")["identification_s"]["count"] == 0 and time.monotonic() < deadline:
+        time.sleep(0.1)
 
 
 def oldest_identification_s(daemon):
@@ -130,16 +133,18 @@ def oldest_identification_s(daemon):
     return max(ages_s) if ages_s else None
 
 
-def identifying(daemon, count):
+def identifying(daemon, count, wait_s):
     """So many scans while identification runs every EVERY_S: what it costs and how old its oldest result gets."""
-    wait_for_identification(daemon)
     before, first, oldest_s = daemon.call("health"), scans_of(daemon.call("status")), 0.0
+    wait_for_identification(daemon, wait_s)
     while scans_of(daemon.call("status")) < first + count:
         oldest_s = max(oldest_s, oldest_identification_s(daemon) or 0.0)
         time.sleep(0.2)
     after, scans = daemon.call("health"), scans_of(daemon.call("status")) - first
     took = after["identification_s"]
-    return {"identifications": took["count"], "identification_s": {"p50": took["p50"], "max": took["max"]},
+    done = max(took["count"], 1)
+    return {"identifications": took["count"], "cpu_s_an_identification": (after["cpu_s"] - before["cpu_s"]) / done,
+            "identification_s": {"p50": took["p50"], "max": took["max"]},
             "oldest_identification_s": oldest_s,
             "cpu_ms_a_scan": 1000 * (after["cpu_s"] - before["cpu_s"]) / scans}
 
@@ -169,7 +174,7 @@ def running(case, folder, sim, every_s):
     return Daemon(folder, configured(case, folder, sim, every_s), "--time-scale", str(case.scale()))
 
 
-def run(case, scans, identifying_scans):
+def run(case, scans, identifying_scans, wait_s):
     result = {"case": case.name(), **dataclasses.asdict(case)}
     with scratch() as folder:
         begin(case, folder)
@@ -179,12 +184,12 @@ def run(case, scans, identifying_scans):
                 daemon.wait_for("status", lambda s: s["test"], "an answer", 300)
                 result["first_answer_s"] = time.perf_counter() - started
                 if case.stored_min:
-                    wait_for_identification(daemon)
+                    wait_for_identification(daemon, wait_s)
                 result["scanning"] = measured_scans(daemon, case.scale(), scans)
                 result["scanning"]["memory_bytes"] = daemon.memory_bytes()
             with running(case, folder, sim, EVERY_S) as daemon:
                 daemon.wait_for("status", lambda s: s["test"], "an answer", 300)
-                result["identifying"] = identifying(daemon, identifying_scans)
+                result["identifying"] = identifying(daemon, identifying_scans, wait_s)
                 result["requests"] = {method: request_cost(daemon, method) for method in REQUESTS}
                 result["commands"] = {" ".join(command): command_cost(folder, command) for command in COMMANDS}
                 result["identifying"]["highest_memory_bytes"] = daemon.call("health")["max_rss_bytes"]
@@ -200,12 +205,12 @@ def row_of(result):
             f"{scanning['late']} / {scanning['missed']}", f"{scanning['cpu_ms_a_scan']:.1f}",
             f"{scanning['database_bytes_a_scan'] / 1024:.1f}", f"{result['first_answer_s']:.2f}",
             f"{scanning['memory_bytes'] / mib:.0f} / {identified['highest_memory_bytes'] / mib:.0f}",
-            f"{identified['identification_s']['p50']:.2f}", f"{identified['oldest_identification_s']:.0f}",
-            f"{identified['cpu_ms_a_scan']:.1f}", f"{result['requests'][slowest]['wall_ms']:.1f} ({slowest})", commands]
+            f"{identified['cpu_s_an_identification']:.2f}" if identified["identifications"] else "-",
+            f"{identified['oldest_identification_s']:.0f}", f"{result['requests'][slowest]['wall_ms']:.1f} ({slowest})", commands]
 
 
 HEAD = ["case", "lateness p50 / p99.9 / max, ms", "late / missed", "CPU a scan, ms", "KiB a scan", "first answer, s",
-        "memory scanning / highest, MiB", "identification, s", "oldest, s of test", "CPU a scan with it, ms",
+        "memory scanning / highest, MiB", "CPU an identification, s", "oldest, s of test",
         "slowest request, ms", "/".join(command[0] for command in COMMANDS) + ", CPU ms"]
 
 
@@ -217,6 +222,7 @@ parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.R
 parser.add_argument("--only", choices=sorted({case.group for case in CASES}))
 parser.add_argument("--scans", type=int, default=200)
 parser.add_argument("--identifying-scans", type=int, default=30)
+parser.add_argument("--wait-s", type=float, default=600.0, help="for the first identification, real")
 parser.add_argument("--json", help="file for everything that was measured")
 args = parser.parse_args()
 print_row(HEAD)
@@ -224,7 +230,7 @@ print_row(["---"] * len(HEAD))
 results = []
 for one in CASES:
     if args.only in (None, one.group):
-        results.append(run(one, args.scans, args.identifying_scans))
+        results.append(run(one, args.scans, args.identifying_scans, args.wait_s))
         print_row(row_of(results[-1]))
         if args.json:
             pathlib.Path(args.json).write_text(json.dumps(results, indent=1), encoding="utf-8")
