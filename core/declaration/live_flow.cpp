@@ -34,7 +34,7 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
     const TestWindow& since = regime.window;
     WindowVerdict verdict{window.end_s() / 60.0, regime.since_s / 60.0, {}, {}, {}};
 
-    forget_before(since.end_s() - 2.0 * options_.guards.look_back_min * 60.0, window.period_s);
+    forget_before(since.end_s() - 2.0 * options_.guards.look_back_min * 60.0, since.period_s);
     std::vector<TestWindow> seen{since};  // and the same regime seen from a little earlier
     for (const double back : {1.0, 2.0}) {
         seen.push_back(window_until(since, since.end_s() - back * options_.guards.look_back_min * 60.0));
@@ -51,7 +51,7 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
         if (regime.began_with.empty()) verdict.spectrum = archived(now->estimate);
     }
 
-    std::optional<TestWindow> seen;  // by the sweeps
+    std::optional<TestWindow> sweeps_see;
     for (const Column& column : window.channels) {
         if (column.name == options_.ambient) continue;
         ChannelVerdict channel = begin_verdict(column, verdict.window_end_min);
@@ -64,8 +64,8 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
             ask_shared_modes(channel, evidence, options_);
         }
         if (!settled.contains(channel.channel) && sweep_is_wanted(channel)) {
-            if (!seen) seen = swept_window(since, options_);
-            const auto sweep = swept(*seen, channel.channel, parallel_for, cancelled);
+            if (!sweeps_see) sweeps_see = swept_window(since, options_);
+            const auto sweep = swept(*sweeps_see, channel.channel, parallel_for, cancelled);
             if (cancelled()) return fail(NextStep::stop, "cancelled");
             ask_sweep(channel, sweep, options_);
         }
