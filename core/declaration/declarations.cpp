@@ -6,10 +6,12 @@
 
 #include <fmt/format.h>
 
+#include "series/sample.hpp"
+
 namespace thermbal {
 namespace {
 
-std::string both(const ChannelVerdict& declared, const ChannelVerdict& now) {
+std::string then_and_now(const ChannelVerdict& declared, const ChannelVerdict& now) {
     return fmt::format(
         "{:.2f} to {:.2f} C was declared at {:.1f} min, {:.2f} to {:.2f} C is known at {:.1f} min",
         declared.steady_state_low_C, declared.steady_state_high_C, declared.declared_at_min,
@@ -35,7 +37,7 @@ ChannelVerdict measured_on(const ChannelVerdict& now, const std::string& why) {
     ChannelVerdict verdict = now;
     if (!now.declared()) return verdict;
     verdict.state = ChannelState::measuring;  // a new declaration wants a window of its own
-    verdict.declared_at_min = verdict.stands_since_min = std::numeric_limits<double>::quiet_NaN();
+    verdict.declared_at_min = verdict.stands_since_min = no_value;
     verdict.reason = "an earlier declaration was withdrawn: " + why;
     return verdict;
 }
@@ -86,6 +88,7 @@ std::vector<DeclarationChange> Declarations::update(const std::vector<ChannelVer
             next.push_back(now);
             continue;
         }
+        const bool better = renewals == Renewals::wanted && known_better(*before, now);
         if (regime_since_min > before->declared_at_min) {
             const std::string why =
                 fmt::format("the regime changed at {:.1f} min, after the declaration at {:.1f} min",
@@ -93,10 +96,10 @@ std::vector<DeclarationChange> Declarations::update(const std::vector<ChannelVer
             change(DeclarationChange::Kind::withdrawn, now, why, measured_on(now, why));
         } else if (now.state == ChannelState::dead || now.state == ChannelState::stuck) {
             next.push_back(*before);
-        } else if (renewals == Renewals::wanted && now.declared() && known_better(*before, now)) {
-            change(DeclarationChange::Kind::renewed, now, both(*before, now), renewed(*before, now));
-        } else if (apart(*before, now) || (renewals == Renewals::wanted && known_better(*before, now))) {
-            const std::string why = both(*before, now);
+        } else if (better && now.declared()) {
+            change(DeclarationChange::Kind::renewed, now, then_and_now(*before, now), renewed(*before, now));
+        } else if (better || apart(*before, now)) {
+            const std::string why = then_and_now(*before, now);
             change(DeclarationChange::Kind::withdrawn, now, why, measured_on(now, why));
         } else {
             next.push_back(*before);

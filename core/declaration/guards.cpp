@@ -27,17 +27,6 @@ double last_good(std::span<const double> values) {
     return no_value;
 }
 
-double mean_of_first(std::span<const double> values, std::size_t count) {
-    double sum = 0.0;
-    int good = 0;
-    for (const double value : values.first(std::min(count, values.size()))) {
-        if (!std::isfinite(value)) continue;
-        sum += value;
-        ++good;
-    }
-    return good > 0 ? sum / good : no_value;
-}
-
 /// What a sensor said until it fell silent is no ground for a declaration now.
 Guard newest_sample_is_fresh(const GuardEvidence& evidence, const GuardOptions& options) {
     const std::vector<double>& values = evidence.samples.values;
@@ -65,7 +54,7 @@ std::optional<double> room_step_C(std::span<const double> room_C, std::size_t en
     const auto recent = static_cast<std::size_t>(120.0 / period_s),
                before = static_cast<std::size_t>(600.0 / period_s);
     if (recent == 0 || end < recent + before) return std::nullopt;
-    const double now_C = mean_of_first(room_C.subspan(end - recent, recent), recent);
+    const double now_C = mean_of_good(room_C.subspan(end - recent, recent));
     std::vector<double> then_C;
     for (const double value : room_C.subspan(end - recent - before, before)) {
         if (std::isfinite(value)) then_C.push_back(value);
@@ -257,7 +246,8 @@ Regime current_regime(const TestWindow& window, const FlowOptions& options) {
     if (regime.began_with.empty()) return regime;
     constexpr std::size_t first_scans = 4;
     for (const Column& column : window.channels)
-        regime.start_level_C.push_back(mean_of_first(column.values, first_scans));
+        regime.start_level_C.push_back(
+            mean_of_good(std::span(column.values).first(std::min(first_scans, column.values.size()))));
     return regime;
 }
 

@@ -1,9 +1,9 @@
 #include "declaration/live_flow.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
-#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -35,14 +35,14 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
     WindowVerdict verdict{window.end_s() / 60.0, regime.since_s / 60.0, {}, {}, {}};
 
     forget_before(since.end_s() - 2.0 * options_.guards.look_back_min * 60.0, since.period_s);
-    std::vector<TestWindow> seen{since};  // and the same regime seen from a little earlier
-    for (const double back : {1.0, 2.0}) {
-        seen.push_back(window_until(since, since.end_s() - back * options_.guards.look_back_min * 60.0));
-    }
-    estimate(seen, regime.start_level_C, parallel_for);
+    const auto seen_earlier = [&](double look_backs) {
+        return window_until(since, since.end_s() - look_backs * options_.guards.look_back_min * 60.0);
+    };
+    const std::array earlier{seen_earlier(1.0), seen_earlier(2.0)};
+    estimate({&since, &earlier[0], &earlier[1]}, regime.start_level_C, parallel_for);
     const auto& now = estimates_.at(window_key(since));
     std::vector<const SpectrumEstimate*> shorter;
-    for (const TestWindow& before : std::span(seen).subspan(1)) {
+    for (const TestWindow& before : earlier) {
         const auto& estimated = estimates_.at(window_key(before));
         if (estimated) shorter.push_back(&estimated->estimate);
     }
@@ -108,13 +108,13 @@ Result<ChannelSweep> LiveFlow::swept(const TestWindow& seen, const std::string& 
     return result;
 }
 
-void LiveFlow::estimate(const std::vector<TestWindow>& windows, const std::vector<double>& start_level_C,
-                        const ParallelFor& parallel_for) {
+void LiveFlow::estimate(const std::vector<const TestWindow*>& windows,
+                        const std::vector<double>& start_level_C, const ParallelFor& parallel_for) {
     std::vector<const TestWindow*> unknown;
-    for (const TestWindow& window : windows) {
-        const auto same = [&](const TestWindow* other) { return window_key(*other) == window_key(window); };
-        if (!estimates_.contains(window_key(window)) && std::ranges::none_of(unknown, same))
-            unknown.push_back(&window);
+    for (const TestWindow* window : windows) {
+        const auto same = [&](const TestWindow* other) { return window_key(*other) == window_key(*window); };
+        if (!estimates_.contains(window_key(*window)) && std::ranges::none_of(unknown, same))
+            unknown.push_back(window);
     }
     std::vector<std::optional<Result<ArchivedEstimate>>> estimated(unknown.size());
     parallel_for(unknown.size(), [&](std::size_t i) {

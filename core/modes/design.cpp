@@ -3,29 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include <Eigen/Eigenvalues>
 
 #include "base/median.hpp"
 #include "base/units.hpp"
 #include "series/resolution.hpp"
+#include "series/sample.hpp"
 
 namespace thermbal {
 
 namespace {
 
 constexpr double reference_minutes = 3.0;
-
-double mean_of_good(const std::vector<double>& values, std::size_t first, std::size_t last) {
-    double sum = 0.0;
-    std::size_t count = 0;
-    for (std::size_t k = first; k < last; ++k) {
-        if (std::isnan(values[k])) continue;
-        sum += values[k];
-        ++count;
-    }
-    return count == 0 ? std::nan("") : sum / static_cast<double>(count);
-}
 
 void bridge_gaps(std::vector<double>& values) {
     std::size_t last_good = values.size();
@@ -131,7 +122,7 @@ double integrated_autocorrelation(const Eigen::VectorXd& residual) {
 
 BlockMeans block_means(const std::vector<double>& values, Eigen::Index rows, std::size_t scans_per_block) {
     BlockMeans blocks;
-    const double centre = mean_of_good(values, 0, values.size());
+    const double centre = mean_of_good(values);
     blocks.centre_C = std::isnan(centre) ? 0.0 : centre;
     blocks.mean = Eigen::VectorXd::Zero(rows);
     blocks.count = Eigen::VectorXd::Zero(rows);
@@ -182,12 +173,11 @@ AmbientInput ambient_input(const TestWindow& window, std::string_view ambient, d
         return std::clamp<std::size_t>(count, 1, window.scans);
     };
     std::vector<double> values = column->values;
-    const double overall = mean_of_good(values, 0, values.size());
-    if (std::isnan(overall)) return input;
+    if (std::isnan(mean_of_good(values))) return input;
     bridge_gaps(values);
     input.measured = true;
-    input.reference_C = mean_of_good(values, 0, scans_in(reference_minutes));
-    input.tail_C = mean_of_good(values, window.scans - scans_in(tail_min), window.scans);
+    input.reference_C = mean_of_good(std::span(values).first(scans_in(reference_minutes)));
+    input.tail_C = mean_of_good(std::span(values).last(scans_in(tail_min)));
     input.deviation_C.reserve(values.size());
     for (const double value : values) input.deviation_C.push_back(value - input.reference_C);
     return input;

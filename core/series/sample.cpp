@@ -34,4 +34,15 @@ std::optional<Quality> quality_from_string(std::string_view name) {
     return std::nullopt;
 }
 
+double mean_of_good(std::span<const double> values) {
+    double sum = 0.0;
+    std::size_t good = 0;
+    for (const double value : values) {
+        if (!std::isfinite(value)) continue;
+        sum += value;
+        ++good;
+    }
+    return good == 0 ? no_value : sum / static_cast<double>(good);
+}
+
 }  // namespace thermbal

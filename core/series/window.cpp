@@ -26,17 +26,6 @@ TestWindow slice(const TestWindow& window, std::size_t first, std::size_t count)
     return part;
 }
 
-double mean_of_good(std::span<const double> values) {
-    double sum = 0.0;
-    std::size_t good = 0;
-    for (const double value : values) {
-        if (!std::isfinite(value)) continue;
-        sum += value;
-        ++good;
-    }
-    return good == 0 ? no_value : sum / static_cast<double>(good);
-}
-
 /// Times on the grid come out of a product; a scan exactly at the limit must not be lost to rounding.
 constexpr double grid_slack = 1e-6;
 

@@ -189,7 +189,7 @@ void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::
         write([id = test_.id, record = std::move(record)](Store& store) {
             return store.record_declaration(id, record);
         });
-        event(std::string(to_string(change.kind)),
+        event(to_string(change.kind),
               fmt::format("{} settles at {:.2f} C ({:.2f} to {:.2f} C), 95 % of the rise at {:.0f} min{}",
                           verdict.channel, verdict.steady_state_C, verdict.steady_state_low_C,
                           verdict.steady_state_high_C, verdict.equilibrium_time_min,

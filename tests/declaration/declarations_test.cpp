@@ -18,6 +18,13 @@ ChannelVerdict verdict(ChannelState state, double at_min, double low_C, double h
     return made;
 }
 
+/// 26.6 to 26.9 C.
+Declarations declared_at_62() {
+    Declarations declarations;
+    declarations.update({verdict(ChannelState::declared, 62, 26.6, 26.9)}, 0);
+    return declarations;
+}
+
 TEST(Declarations, TheFirstDeclarationStandsWithItsFigures) {
     Declarations declarations;
     EXPECT_TRUE(declarations.update({verdict(ChannelState::measuring, 60, 25, 28)}, 0).empty());
@@ -32,8 +39,7 @@ TEST(Declarations, TheFirstDeclarationStandsWithItsFigures) {
 }
 
 TEST(Declarations, ALaterWindowThatExcludesItWithdrawsIt) {
-    Declarations declarations;
-    declarations.update({verdict(ChannelState::declared, 62, 26.6, 26.9)}, 0);
+    Declarations declarations = declared_at_62();
     const auto changes = declarations.update({verdict(ChannelState::measuring, 80, 26.95, 27.2)}, 0);
     ASSERT_EQ(changes.size(), 1U);
     EXPECT_EQ(changes[0].kind, DeclarationChange::Kind::withdrawn);
@@ -69,16 +75,14 @@ TEST(Declarations, FiguresThatALaterWindowKnowsBetterAreRenewed) {
 }
 
 TEST(Declarations, WhatIsKnownBetterButNotDeclarableIsMeasuredOn) {
-    Declarations declarations;
-    declarations.update({verdict(ChannelState::declared, 62, 26.6, 26.9)}, 0);
+    Declarations declarations = declared_at_62();
     const auto changes = declarations.update({verdict(ChannelState::measuring, 80, 26.88, 27.08)}, 0);
     ASSERT_EQ(changes.size(), 1U);
     EXPECT_EQ(changes[0].kind, DeclarationChange::Kind::withdrawn);
 }
 
 TEST(Declarations, NothingIsRenewedForLittleOrForWhatIsItselfNotKnown) {
-    Declarations declarations;
-    declarations.update({verdict(ChannelState::declared, 62, 26.6, 26.9)}, 0);
+    Declarations declarations = declared_at_62();
     EXPECT_TRUE(declarations.update({verdict(ChannelState::declared, 80, 26.85, 26.95)}, 0).empty())
         << "0.15 C is within the tolerance";
     EXPECT_TRUE(declarations.update({verdict(ChannelState::measuring, 80, 26.74, 27.3)}, 0).empty())
@@ -98,23 +102,20 @@ TEST(Declarations, ARoomThatHasMovedIsNoFaultOfADeclaration) {
 }
 
 TEST(Declarations, WhatATestWasStoppedOnIsNotRenewed) {
-    Declarations declarations;
-    declarations.update({verdict(ChannelState::declared, 62, 26.6, 26.9)}, 0);
+    Declarations declarations = declared_at_62();
     const auto better = verdict(ChannelState::declared, 80, 26.88, 27.08);
     EXPECT_TRUE(declarations.update({better}, 0, Renewals::over).empty());
     EXPECT_EQ(declarations.standing()[0].steady_state_C, 26.75);
 }
 
 TEST(Declarations, ARegimeThatBeganAfterItWithdrawsIt) {
-    Declarations declarations;
-    declarations.update({verdict(ChannelState::declared, 62, 26.6, 26.9)}, 0);
+    Declarations declarations = declared_at_62();
     EXPECT_TRUE(declarations.update({verdict(ChannelState::measuring, 90, 26.6, 26.9)}, 60).empty());
     EXPECT_EQ(declarations.update({verdict(ChannelState::measuring, 92, 26.6, 26.9)}, 91).size(), 1U);
 }
 
 TEST(Declarations, ASensorThatDiesAfterItsDeclarationDoesNotUndoIt) {
-    Declarations declarations;
-    declarations.update({verdict(ChannelState::declared, 62, 26.6, 26.9)}, 0);
+    Declarations declarations = declared_at_62();
     EXPECT_TRUE(declarations.update({verdict(ChannelState::dead, 80, 0, 0)}, 0).empty());
     EXPECT_TRUE(declarations.standing()[0].declared());
 }

@@ -112,7 +112,7 @@ class LiveFlow {
     Result<ChannelSweep> swept(const TestWindow& seen, const std::string& channel,
                                const ParallelFor& parallel_for, const std::function<bool()>& cancelled);
     /// Puts what is not known yet of these windows of one regime into `estimates_`.
-    void estimate(const std::vector<TestWindow>& windows, const std::vector<double>& start_level_C,
+    void estimate(const std::vector<const TestWindow*>& windows, const std::vector<double>& start_level_C,
                   const ParallelFor& parallel_for);
 
     FlowOptions options_;

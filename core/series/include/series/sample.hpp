@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string_view>
 
 namespace thermbal {
@@ -26,6 +27,9 @@ std::string_view to_string(Quality quality);
 std::optional<Quality> quality_from_string(std::string_view name);
 
 inline constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
+
+/// Of those that are values; no_value when none is.
+double mean_of_good(std::span<const double> values);
 
 /// One channel at one scan. `raw` is the register as the module sent it (16 or 32 bits, sign not applied);
 /// empty when the module did not answer. `source_C` is what the module said where a calibration has made
