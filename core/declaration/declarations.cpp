@@ -11,25 +11,32 @@
 namespace thermbal {
 namespace {
 
+/// What the room alone has moved the steady state by since (gain 1): no fault of the declaration.
+double room_moved_C(const ChannelVerdict& declared, const ChannelVerdict& now) {
+    const double moved_C = now.room_C - declared.room_C;
+    return std::isfinite(moved_C) ? moved_C : 0.0;
+}
+
 std::string then_and_now(const ChannelVerdict& declared, const ChannelVerdict& now) {
+    const double room_C = room_moved_C(declared, now);
     return fmt::format(
-        "{:.2f} to {:.2f} C was declared at {:.1f} min, {:.2f} to {:.2f} C is known at {:.1f} min",
+        "{:.2f} to {:.2f} C was declared at {:.1f} min, {:.2f} to {:.2f} C is known at {:.1f} min{}",
         declared.steady_state_low_C, declared.steady_state_high_C, declared.declared_at_min,
-        now.steady_state_low_C, now.steady_state_high_C, now.window_end_min);
+        now.steady_state_low_C, now.steady_state_high_C, now.window_end_min,
+        room_C == 0.0 ? "" : fmt::format(" (the room {:+.2f} C since)", room_C));
 }
 
 /// The declared interval and the one of a longer window may differ at their edges; they may not be apart.
 bool apart(const ChannelVerdict& declared, const ChannelVerdict& now) {
-    return now.steady_state_low_C > declared.steady_state_high_C ||
-           now.steady_state_high_C < declared.steady_state_low_C;
+    const double room_C = room_moved_C(declared, now);
+    return now.steady_state_low_C - room_C > declared.steady_state_high_C ||
+           now.steady_state_high_C - room_C < declared.steady_state_low_C;
 }
 
-/// What is known now, itself within the tolerance, leaves out what was declared. That the room has moved
-/// since is no fault of the declaration.
+/// What is known now, itself within the tolerance, leaves out what was declared.
 bool known_better(const ChannelVerdict& declared, const ChannelVerdict& now) {
     const double half_C = 0.5 * (now.steady_state_high_C - now.steady_state_low_C);
-    const double room_C = std::isfinite(declared.room_C) ? now.room_C - declared.room_C : 0.0;
-    const double off_C = std::abs(now.steady_state_C - declared.steady_state_C - room_C);
+    const double off_C = std::abs(now.steady_state_C - declared.steady_state_C - room_moved_C(declared, now));
     return half_C <= now.tolerance_C && off_C > half_C && off_C > declared.tolerance_C;
 }
 

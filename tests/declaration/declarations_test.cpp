@@ -101,6 +101,18 @@ TEST(Declarations, ARoomThatHasMovedIsNoFaultOfADeclaration) {
     EXPECT_EQ(declarations.update({later}, 0).size(), 1U);
 }
 
+TEST(Declarations, WhatIsApartOnlyByTheRoomStands) {
+    Declarations declarations;
+    auto first = verdict(ChannelState::declared, 62, 26.6, 26.9);
+    first.room_C = 21.0;
+    declarations.update({first}, 0);
+    auto later = verdict(ChannelState::measuring, 80, 27.0, 27.8);
+    later.room_C = 21.6;
+    EXPECT_TRUE(declarations.update({later}, 0).empty());
+    later.room_C = 21.0;
+    EXPECT_EQ(declarations.update({later}, 0)[0].kind, DeclarationChange::Kind::withdrawn);
+}
+
 TEST(Declarations, WhatATestWasStoppedOnIsNotRenewed) {
     Declarations declarations = declared_at_62();
     const auto better = verdict(ChannelState::declared, 80, 26.88, 27.08);
