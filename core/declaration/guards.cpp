@@ -160,20 +160,20 @@ Guard slowest_seen_long_enough(const ChannelEstimate& now, const GuardEvidence& 
 
 /// A sensor far from the heat goes its way late: while most of it is still to come, its slow share is the
 /// prior's word and not the data's (on the finite-volume machines 4 % of such declarations were wrong, of the
-/// others 0.8 %).
+/// others 0.8 %). Of the machine's own heat: what the room does is measured.
 Guard most_of_the_rise_seen(const ChannelEstimate& now, const FlowOptions& options) {
-    const double share = (now.last_C - (now.steady_state_C - now.rise_C)) / now.rise_C;
-    const bool barely = std::abs(now.rise_C) <= options.tolerance_C;
+    const double share = 1.0 - now.own_to_come_C() / now.own_rise_C();
+    const bool barely = std::abs(now.own_rise_C()) <= options.tolerance_C;
     return {"most_of_the_rise_seen", barely || share >= options.guards.share_of_rise,
             fmt::format("{:.0f} % of its way is seen (needed {:.0f} %)", 100.0 * share,
                         100.0 * options.guards.share_of_rise)};
 }
 
 Guard physical(const ChannelEstimate& now, const GuardOptions& options) {
-    const double direction = now.last_C >= now.start_C ? 1.0 : -1.0;
-    const double ahead_C = direction * (now.steady_state_C - now.last_C);
-    return {"physical", ahead_C >= -options.overshoot_C,
-            fmt::format("from {:.2f} C now to {:.2f} C", now.last_C, now.steady_state_C)};
+    const double direction = now.own_rise_C() >= now.own_to_come_C() ? 1.0 : -1.0;
+    return {"physical", direction * now.own_to_come_C() >= -options.overshoot_C,
+            fmt::format("from {:.2f} C now to {:.2f} C, of it {:.2f} C after the room", now.last_C,
+                        now.steady_state_C, now.room_to_come_C)};
 }
 
 /// The first scan of the run of identical readings at the end of a channel; missing samples do not end it.
@@ -313,7 +313,8 @@ void ask_shared_modes(ChannelVerdict& verdict, const GuardEvidence& evidence, co
     verdict.guards.push_back(most_of_the_rise_seen(*now, options));
     verdict.guards.push_back(physical(*now, options.guards));
     const bool known = first_failed(verdict.guards) == nullptr;
-    if (known && std::abs(now->rise_C) <= options.guards.barely_rise_in_tolerances * options.tolerance_C) {
+    if (known &&
+        std::abs(now->own_rise_C()) <= options.guards.barely_rise_in_tolerances * options.tolerance_C) {
         verdict.state = ChannelState::barely_warming;
     }
 }

@@ -49,10 +49,23 @@ Eigen::VectorXd coefficients_of(const ObservedChannel& channel, const ChannelDra
     return coefficients;
 }
 
+/// Of a steady state, what the room adds: by how far it has moved in all, and by what of that the channel has
+/// yet to follow. Both are 0 without an ambient.
+void split_off_the_room(const SpectrumProblem& problem, const Eigen::VectorXd& of_basis,
+                        const Eigen::RowVectorXd& now, ChannelEstimate& channel) {
+    if (!problem.basis.has_ambient) return;
+    const Eigen::Index lags = problem.basis.grid();
+    const Eigen::VectorXd answer = of_basis.segment(1 + lags, lags);
+    const double in_all_C = problem.functional.segment(1 + lags, lags).dot(answer);
+    channel.room_rise_C = in_all_C + problem.room_before_C * answer.sum();
+    channel.room_to_come_C = in_all_C - now.segment(1 + lags, lags).dot(answer);
+}
+
 /// How a posterior becomes an interval, see SpectrumOptions.
 struct IntervalRule {
     double factor = 1.0;
     double floor_C = 0.0;
+    double room_to_come_floor = 0.0;
 };
 
 IntervalRule interval_rule(const SpectrumProblem& problem, bool first_test_from_its_start,
@@ -60,7 +73,20 @@ IntervalRule interval_rule(const SpectrumProblem& problem, bool first_test_from_
     return {
         first_test_from_its_start ? options.interval_factor : 1.0,
         std::hypot(options.model_floor_C,
-                   options.room_floor * range_over_the_last_hour_C(problem.room, problem.window.period_s))};
+                   options.room_floor * range_over_the_last_hour_C(problem.room, problem.window.period_s)),
+        options.room_to_come_floor};
+}
+
+/// Evenly about the channel's steady state.
+void give_interval(const ChannelDraws& draws, const IntervalRule& rule, ChannelEstimate& channel) {
+    const double sd_C = draws.standard_deviation();
+    const double floor_C = std::hypot(rule.floor_C, rule.room_to_come_floor * channel.room_to_come_C);
+    // A skewed posterior can have a narrow 90 % and a long tail: the wider of the two counts.
+    const double half_C = std::hypot(
+        rule.factor * std::max(draws.half_width_of_90_percent(), sds_of_90_percent * sd_C), floor_C);
+    channel.steady_state_sd_C = std::hypot(rule.factor * sd_C, floor_C / sds_of_90_percent);
+    channel.steady_state_low_C = channel.steady_state_C - half_C;
+    channel.steady_state_high_C = channel.steady_state_C + half_C;
 }
 
 ChannelEstimate channel_estimate(const SpectrumProblem& problem, const ObservedChannel& observed,
@@ -77,15 +103,7 @@ ChannelEstimate channel_estimate(const SpectrumProblem& problem, const ObservedC
     channel.variance_inflation = data.variance_inflation;
 
     const double settled = draws.steady_state();
-    const double sd_C = draws.standard_deviation();
-    // A skewed posterior can have a narrow 90 % and a long tail: the wider of the two counts.
-    const double half_C = std::hypot(
-        rule.factor * std::max(draws.half_width_of_90_percent(), sds_of_90_percent * sd_C), rule.floor_C);
     channel.steady_state_C = data.centre_C + settled;
-    channel.steady_state_sd_C = std::hypot(rule.factor * sd_C, rule.floor_C / sds_of_90_percent);
-    channel.steady_state_low_C = channel.steady_state_C - half_C;
-    channel.steady_state_high_C = channel.steady_state_C + half_C;
-
     const Eigen::VectorXd curve = draws.linear * draws.background + curves.fine * draws.fine;
     const Eigen::VectorXd coefficients = coefficients_of(observed, draws, problem.basis);
     channel.coefficients.assign(coefficients.begin(), coefficients.end());
@@ -93,6 +111,9 @@ ChannelEstimate channel_estimate(const SpectrumProblem& problem, const ObservedC
     channel.last_C = data.centre_C + curve[problem.design.rows()];
     const double start_C = std::isnan(observed.test_start_C) ? channel.start_C : observed.test_start_C;
     channel.rise_C = channel.steady_state_C - start_C;
+    split_off_the_room(problem, coefficients.head(problem.basis.size()),
+                       curves.design.row(problem.design.rows()), channel);
+    give_interval(draws, rule, channel);
     channel.equilibrium_time_min = problem.window.start_s / seconds_per_min +
                                    crossing_time(curves.minute, curve, start_C - data.centre_C, settled);
     channel.equilibrium_low_min =

@@ -165,6 +165,16 @@ Result<std::vector<ObservedChannel>> observed_channels(const SpectrumProblem& pr
     return channels;
 }
 
+double room_moved_before(const SpectrumProblem& problem, std::string_view ambient,
+                         const std::vector<double>& start_level_C) {
+    if (!problem.room.measured || start_level_C.empty()) return 0.0;
+    for (std::size_t i = 0; i < problem.window.channels.size(); ++i) {
+        if (problem.window.channels[i].name != ambient || !std::isfinite(start_level_C[i])) continue;
+        return problem.room.reference_C - start_level_C[i];
+    }
+    return 0.0;
+}
+
 /// A sensor far from the heat is flat at first because its modes cancel, not because they are small: no
 /// channel's scale is far below that of the others.
 void give_scales(std::vector<ObservedChannel>& channels, double scale_floor) {
@@ -209,6 +219,7 @@ Result<SpectrumProblem> pose_problem(const TestWindow& recorded, std::string_vie
     SpectrumProblem problem;
     problem.window = without_spikes(recorded);
     problem.room = ambient_input(problem.window, ambient, options.ambient_tail_min);
+    problem.room_before_C = room_moved_before(problem, ambient, start_level_C);
     problem.basis = {logarithmic_grid(options.fastest_min, options.slowest_min, options.background_points),
                      problem.room.measured};
     problem.fine_grid = logarithmic_grid(options.fastest_min, options.slowest_min, options.grid);

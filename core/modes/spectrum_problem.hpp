@@ -29,6 +29,7 @@ struct ObservedChannel {
 struct SpectrumProblem {
     TestWindow window;  ///< without spikes
     AmbientInput room;
+    double room_before_C = 0.0;  ///< what the room moved from the start of the test to the window's
     Basis basis;
     std::vector<double> fine_grid;  ///< time constants of the modes' grid, min
     std::size_t scans_per_block = 1;

@@ -65,10 +65,11 @@ struct SpectrumOptions {
     /// there, and under an archive, the posterior stands as it is.
     double interval_factor = 0.8;
     /// No model of a machine is better than this, however long it was measured: added to the half width in
-    /// quadrature, in C and as a share of the room's range over the last hour (a cycling room has no one
-    /// mean).
+    /// quadrature, in C, as a share of the room's range over the last hour (a cycling room has no one mean),
+    /// and as a share of what the room has done and the channel has yet to follow.
     double model_floor_C = 0.04;
     double room_floor = 0.05;
+    double room_to_come_floor = 0.2;
 
     Result<void> check() const;
 };
@@ -104,6 +105,8 @@ struct ChannelEstimate {
     double equilibrium_low_min = 0.0;
     double equilibrium_high_min = 0.0;
     double rise_C = 0.0;              ///< steady state less the level at the start of the test
+    double room_rise_C = 0.0;         ///< what of it is the room's, moved since the start of the test
+    double room_to_come_C = 0.0;      ///< what of steady state less last level the room has already done
     double noise_C = 0.0;             ///< standard deviation of one sample about the fit
     double resolution_C = 0.0;        ///< smallest step between readings
     double residual_rms_C = 0.0;      ///< of block means about the fit
@@ -111,6 +114,11 @@ struct ChannelEstimate {
     double slowest_time_constant_min =
         0.0;  ///< slowest that carries at least 5 % of this channel's amplitudes
     std::size_t good_samples = 0;
+
+    /// What the machine's own heat does in a room that stays: of the whole test, and from now on.
+    double own_rise_C() const { return rise_C - room_rise_C; }
+    double own_to_come_C() const { return steady_state_C - last_C - room_to_come_C; }
+
     bool used_responses = false;       ///< archived responses of this channel took part
     std::vector<double> coefficients;  ///< posterior mean, for predict_curve
 };
