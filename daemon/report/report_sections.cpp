@@ -59,6 +59,13 @@ std::string interval(const ChannelVerdict& verdict) {
                : "-";
 }
 
+/// With the room's temperature that the steady state is said for: it may have moved since.
+std::string declared_at(const ChannelVerdict& verdict) {
+    const std::string room =
+        std::isfinite(verdict.room_C) ? fmt::format(", room at {:.2f} &deg;C", verdict.room_C) : "";
+    return fmt::format("declared at {}{}", duration(verdict.declared_at_min), room);
+}
+
 std::string channel_row(const TestReport& report, const ReportChannel& channel) {
     const Column* const measured = report.measured(channel);
     const ChannelVerdict none;
@@ -74,8 +81,7 @@ std::string channel_row(const TestReport& report, const ReportChannel& channel) 
         interval(verdict), duration(verdict.equilibrium_time_min),
         verdict.n > 0 ? std::to_string(verdict.n) : "-",
         std::isfinite(verdict.window_rmse_C) ? fmt::format("{:.3f}", verdict.window_rmse_C) : "-",
-        class_of_state(channel),
-        declared ? fmt::format("declared at {}", duration(verdict.declared_at_min)) : state_of(channel));
+        class_of_state(channel), declared ? declared_at(verdict) : state_of(channel));
 }
 
 std::string quality_name(Quality quality) {

@@ -25,6 +25,11 @@ Column& column_of(std::vector<Column>& columns, const std::string& name) {
     return found != columns.end() ? *found : columns.emplace_back(Column{name, {}});
 }
 
+/// What a steady state holds for: the room may move on.
+std::string in_its_room(const ChannelVerdict& verdict) {
+    return std::isfinite(verdict.room_C) ? fmt::format(" in a room of {:.2f} C", verdict.room_C) : "";
+}
+
 }  // namespace
 
 void Daemon::take_scan(Scan& scan) {
@@ -190,9 +195,9 @@ void Daemon::record_changes(const std::vector<DeclarationChange>& changes, std::
             return store.record_declaration(id, record);
         });
         event(to_string(change.kind),
-              fmt::format("{} settles at {:.2f} C ({:.2f} to {:.2f} C), 95 % of the rise at {:.0f} min{}",
+              fmt::format("{} settles at {:.2f} C ({:.2f} to {:.2f} C){}, 95 % of the rise at {:.0f} min{}",
                           verdict.channel, verdict.steady_state_C, verdict.steady_state_low_C,
-                          verdict.steady_state_high_C, verdict.equilibrium_time_min,
+                          verdict.steady_state_high_C, in_its_room(verdict), verdict.equilibrium_time_min,
                           change.kind == DeclarationChange::Kind::renewed ? "; " + change.reason : ""),
               verdict.channel);
         server_.publish("declaration", json);
