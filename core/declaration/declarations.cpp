@@ -79,7 +79,7 @@ std::string_view to_string(DeclarationChange::Kind kind) {
 }
 
 std::vector<DeclarationChange> Declarations::update(const std::vector<ChannelVerdict>& fresh,
-                                                    double regime_since_min, Renewals renewals) {
+                                                    double last_change_min, Renewals renewals) {
     std::vector<DeclarationChange> changes;
     std::vector<ChannelVerdict> next;
     const auto change = [&](DeclarationChange::Kind kind, const ChannelVerdict& now, std::string reason,
@@ -96,10 +96,10 @@ std::vector<DeclarationChange> Declarations::update(const std::vector<ChannelVer
             continue;
         }
         const bool better = renewals == Renewals::wanted && known_better(*before, now);
-        if (regime_since_min > before->declared_at_min) {
-            const std::string why =
-                fmt::format("the regime changed at {:.1f} min, after the declaration at {:.1f} min",
-                            regime_since_min, before->declared_at_min);
+        if (last_change_min > before->declared_at_min) {
+            const std::string why = fmt::format(
+                "the machine's inputs or its room changed at {:.1f} min, after the declaration at {:.1f} min",
+                last_change_min, before->declared_at_min);
             change(DeclarationChange::Kind::withdrawn, now, why, measured_on(now, why));
         } else if (now.state == ChannelState::dead || now.state == ChannelState::stuck) {
             next.push_back(*before);

@@ -313,8 +313,8 @@ void ask_shared_modes(ChannelVerdict& verdict, const GuardEvidence& evidence, co
     verdict.guards.push_back(most_of_the_rise_seen(*now, options));
     verdict.guards.push_back(physical(*now, options.guards));
     const bool known = first_failed(verdict.guards) == nullptr;
-    if (known &&
-        std::abs(now->own_rise_C()) <= options.guards.barely_rise_in_tolerances * options.tolerance_C) {
+    const double most_C = std::max(std::abs(now->rise_C), std::abs(now->own_rise_C()));
+    if (known && most_C <= options.guards.barely_rise_in_tolerances * options.tolerance_C) {
         verdict.state = ChannelState::barely_warming;
     }
 }

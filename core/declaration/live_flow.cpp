@@ -32,7 +32,8 @@ Result<WindowVerdict> LiveFlow::identify(const TestWindow& window, const std::se
     }
     const Regime regime = current_regime(window, options_);
     const TestWindow& since = regime.window;
-    WindowVerdict verdict{window.end_s() / 60.0, regime.since_s / 60.0, {}, {}, {}};
+    WindowVerdict verdict{
+        window.end_s() / 60.0, regime.since_s / 60.0, regime.last_change_s / 60.0, {}, {}, {}};
 
     forget_before(since.end_s() - 2.0 * options_.guards.look_back_min * 60.0, since.period_s);
     const auto seen_earlier = [&](double look_backs) {

@@ -52,7 +52,7 @@ Result<Replay> replay(const OfflineInput& input, const OfflineOptions& options,
             fmt::print(stderr, "thermbalctl: at {:.2f} min: {}\n", verdict->window_end_min,
                        done.archive_dropped);
         }
-        for (DeclarationChange& change : declarations.update(verdict->channels, verdict->regime_since_min)) {
+        for (DeclarationChange& change : declarations.update(verdict->channels, verdict->last_change_min)) {
             done.changes.push_back({verdict->window_end_min, std::move(change)});
             tell(done.changes.back());
         }

@@ -80,7 +80,7 @@ void Daemon::take_identification(IdentificationResult result) {
         test_.spectrum = std::move(result.verdict->spectrum);
         test_.spectrum_window_min = result.verdict->window_end_min;
         const auto changes =
-            test_.declarations.update(result.verdict->channels, result.verdict->regime_since_min,
+            test_.declarations.update(result.verdict->channels, result.verdict->last_change_min,
                                       test_.state == TestState::running ? Renewals::wanted : Renewals::over);
         record_changes(changes, result.window_end_scan);
         server_.publish("predictions", predictions_json().value_or(nullptr));

@@ -24,16 +24,17 @@ enum class Renewals { wanted, over };
 
 /// The declarations of a test so far. A declaration stands with the figures of the window that it was made
 /// on, until later samples contradict it:
-/// - the machine's regime changed after it: withdrawn, and the channel is measured on;
+/// - the machine's inputs changed or the room jumped after it: withdrawn, and the channel is measured on. A
+///   room that drifts is no such change: a steady state is said for the room of its window;
 /// - a later window, whose interval is within the tolerance and leaves out the declared steady state, is off
 ///   from it by more than the tolerance: renewed with the figures of that window where all guards but the
 ///   sweep pass on it (what the sweep said of the declaration it keeps), else withdrawn;
-/// - a later interval and the declared one are apart: withdrawn.
+/// - a later interval and the declared one are apart, the room's move taken out: withdrawn.
 class Declarations {
   public:
-    /// Takes the fresh verdicts of one window. `regime_since_min`: when the regime that the window is in
-    /// began, on the test's time; a declaration from before it does not stand.
-    std::vector<DeclarationChange> update(const std::vector<ChannelVerdict>& fresh, double regime_since_min,
+    /// Takes the fresh verdicts of one window. `last_change_min`: of the inputs or the room, on the test's
+    /// time; a declaration from before it does not stand.
+    std::vector<DeclarationChange> update(const std::vector<ChannelVerdict>& fresh, double last_change_min,
                                           Renewals renewals = Renewals::wanted);
 
     /// Declarations that an earlier life of the daemon made and stored.

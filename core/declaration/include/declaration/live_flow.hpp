@@ -82,6 +82,8 @@ struct FlowOptions {
 struct WindowVerdict {
     double window_end_min = 0.0;
     double regime_since_min = 0.0;  ///< when the regime began that the window ends in
+    double last_change_min = 0.0;  ///< of the machine's inputs or, by a jump, of the room; the window's start
+                                   ///< if there is none
     std::string
         archive_dropped;  ///< why the archive's prior was not used on this window; empty when it was, or none
     std::optional<ArchivedSpectrum>
