@@ -28,19 +28,20 @@ double roughness(const std::vector<double>& y) {
     return bends.empty() ? 0.0 : sd_of_mad * median(bends) / std::sqrt(6.0);
 }
 
-bool at_the_floor(const RmseMinimum& found, const CriterionOptions& options) {
-    return found.rmse_C <= options.floor_in_noises * found.noise_C;
+double allowed_gain_C(const RmseMinimum& found, const CriterionOptions& options) {
+    return std::max(options.edge_gain_C, options.edge_gain_in_noises * found.noise_C);
 }
 
 bool has_ended(const RmseMinimum& found, const CriterionOptions& options) {
-    return found.falling <= options.edge_fall || at_the_floor(found, options);
+    return found.falling <= options.edge_fall || found.gain_C <= allowed_gain_C(found, options);
 }
 
 std::string end_of_curve(const RmseMinimum& found, std::size_t lags, const CriterionOptions& options) {
     if (found.falling <= options.edge_fall) return "the curve has turned or levelled off";
-    if (at_the_floor(found, options)) return "the curve has come down to the noise of the readings";
-    return fmt::format("still falling at n = {} (by {:.2f}, allowed {:.2f} above {:.3f} C)", lags,
-                       found.falling, options.edge_fall, options.floor_in_noises * found.noise_C);
+    const bool ended = has_ended(found, options);
+    return fmt::format("{} at n = {} (by {:.3f} C, {:.2f} in ln; allowed {:.3f} C or {:.2f})",
+                       ended ? "hardly falling any more" : "still falling", lags, found.gain_C, found.falling,
+                       allowed_gain_C(found, options), options.edge_fall);
 }
 
 }  // namespace
@@ -73,7 +74,8 @@ RmseMinimum find_minimum(std::span<const double> rmse_by_n_C, double noise_C,
     for (std::size_t i = 0; i < y.size() && lags[i] <= before_the_edge; ++i)
         lowest_before = std::min(lowest_before, y[i]);
     found.falling = lowest_before - y[lowest];
-    found.clear = found.n > 1 && has_ended(found, options) && found.depth >= options.min_depth &&
+    found.gain_C = std::exp(lowest_before) - found.rmse_C;
+    found.clear = has_ended(found, options) && found.depth >= options.min_depth &&
                   found.depth >= options.min_depth_in_scatters * found.scatter;
     found.guard.passed = found.clear;
     found.guard.figures = fmt::format(

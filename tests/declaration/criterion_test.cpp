@@ -35,7 +35,7 @@ TEST(Criterion, DepthAndScatterAreWhatTheirDefinitionsSay) {
 }
 
 TEST(Criterion, ACurveThatStillFallsHasNoMinimumYet) {
-    const auto found = find_minimum(curve([](int n) { return std::exp(-0.1 * n); }), 0.02, {});
+    const auto found = find_minimum(curve([](int n) { return 5.0 * std::exp(-0.1 * n); }), 0.02, {});
     EXPECT_EQ(found.n, 35);
     EXPECT_NEAR(found.falling, 0.5, 1e-12);
     EXPECT_FALSE(found.clear);
@@ -46,17 +46,19 @@ TEST(Criterion, ACurveThatEndsInAFloorHasOne) {
     EXPECT_TRUE(found.clear) << found.guard.figures;
 }
 
-TEST(Criterion, BelowTheNoiseOfTheReadingsItNeedNotLevelOff) {
-    const auto falls = curve([](int n) { return std::exp(-0.1 * n); });  // to 0.0302
-    EXPECT_FALSE(find_minimum(falls, 0.0302 / 0.71, {}).clear);
-    const auto found = find_minimum(falls, 0.0302 / 0.69, {});
-    EXPECT_TRUE(found.clear) << found.guard.figures;
+TEST(Criterion, ItNeedNotLevelOffWhereItGainsLittle) {
+    const auto falls = curve([](int n) { return 0.9 * std::exp(-0.1 * n); });  // the last five lags: 0.0176 C
+    EXPECT_NEAR(find_minimum(falls, 0.02, {}).gain_C, 0.9 * (std::exp(-3.0) - std::exp(-3.5)), 1e-12);
+    EXPECT_TRUE(find_minimum(falls, 0.02, {}).clear);
+    const auto coarser = curve([](int n) { return 2.0 * std::exp(-0.1 * n); });  // 0.0392 C
+    EXPECT_FALSE(find_minimum(coarser, 2.0 * 0.0392 / 1.01, {}).clear);
+    EXPECT_TRUE(find_minimum(coarser, 2.0 * 0.0392 / 0.99, {}).clear);
 }
 
-TEST(Criterion, ARisingCurveHasNone) {
-    const auto found = find_minimum(curve([](int n) { return 0.1 * std::exp(0.05 * n); }), 1.0, {});
+TEST(Criterion, OneLagIsEnoughForAChannelOfFirstOrder) {
+    const auto found = find_minimum(curve([](int n) { return 0.1 * std::exp(0.05 * n); }), 0.02, {});
     EXPECT_EQ(found.n, 1);
-    EXPECT_FALSE(found.clear);
+    EXPECT_TRUE(found.clear);
 }
 
 TEST(Criterion, NoiseAroundAConstantHasNone) {
