@@ -57,7 +57,9 @@ StopDecision decide_stop(std::span<const ChannelVerdict> verdicts, const std::ve
                       "every required channel is declared; {}, the last of them, is watched until {:.1f} min",
                       newest->channel, stood_min);
     } else if (!broken.empty()) {
-        decision.reason = fmt::format("{}: mend the sensor, make the channel not required, or stop by hand",
+        decision.held = broken.size() == decision.waiting.size() && declared > 0;
+        decision.reason = fmt::format("{}{}: mend the sensor, make the channel not required, or stop by hand",
+                                      decision.held ? "every other required channel is declared; " : "",
                                       fmt::join(broken, ", "));
     } else if (decision.waiting.empty()) {
         decision.reason = "no channel has warmed enough to declare anything";

@@ -159,7 +159,7 @@ void show_scan(const json& scan, double& shown_min) {
 void show_event(const json& event) {
     const std::string kind = text(event, "kind");
     for (const char* told :
-         {"declared", "renewed", "withdrawn", "all_declared", "stopped", "aborted", "line_trouble"})
+         {"declared", "renewed", "withdrawn", "all_declared", "held", "stopped", "aborted", "line_trouble"})
         if (kind == told)
             print_text(fmt::format("{:7.1f} min  {}\n", number(event, "time_s").value_or(0.0) / 60.0,
                                    printable(text(event, "message"))));

@@ -143,7 +143,8 @@ Ink ink_of_event(const json& event) {
     const std::string kind = text(event, "kind");
     if (kind == "declared" || kind == "renewed" || kind == "all_declared" || kind == "stopped")
         return Ink::good;
-    if (kind == "withdrawn" || kind == "aborted" || kind.ends_with("trouble")) return Ink::bad;
+    if (kind == "withdrawn" || kind == "aborted" || kind == "held" || kind.ends_with("trouble"))
+        return Ink::bad;
     return Ink::plain;
 }
 

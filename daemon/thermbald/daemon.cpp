@@ -96,8 +96,11 @@ void Daemon::decide() {
             std::ranges::find(options_.config.channels, verdict.channel, &ChannelConfig::name);
         required.push_back(channel != options_.config.channels.end() && channel->required);
     }
-    test_.decision = decide_stop(test_.declarations.standing(), required, test_.spectrum_window_min);
-    if (!test_.decision.stop || test_.state != TestState::running) return;
+    const StopDecision before = std::exchange(
+        test_.decision, decide_stop(test_.declarations.standing(), required, test_.spectrum_window_min));
+    if (test_.state != TestState::running) return;
+    if (test_.decision.held && before.reason != test_.decision.reason) event("held", test_.decision.reason);
+    if (!test_.decision.stop) return;
 
     test_.state = TestState::declared;
     write([id = test_.id, at = now(), reason = test_.decision.reason](Store& store) {

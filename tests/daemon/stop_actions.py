@@ -34,6 +34,18 @@ def a_command_is_told_what_ended():
         assert kinds.index("declared") < kinds.index("all_declared") < kinds.index("stopped"), kinds
 
 
+def a_broken_sensor_that_alone_holds_the_test_is_said():
+    with scratch() as folder, Simulator("--lockstep", "15", "--fault", "open:T3@600") as sim:
+        config = configuration(folder, {"transport": "tcp", "host": "127.0.0.1", "port": sim.port},
+                               **(SOON | {"required": ["T2", "T3"]}))
+        with Daemon(folder, config, "--lockstep") as daemon:
+            daemon.wait_for("status", lambda s: "T3 is dead" in s.get("test", {}).get("reason", ""), "a dead sensor", 60)
+            held = wait_until(lambda: [m for kind, m in events(folder) if kind == "held"], "the event", 240)
+            daemon.wait_for("status", lambda s: s["state"] == "running", "a test that goes on", 10)
+        assert held == ["every other required channel is declared; T3 is dead: mend the sensor, make the channel not "
+                        "required, or stop by hand"], held
+
+
 def a_coil_of_the_module_is_cleared():
     with scratch() as folder:
         with Simulator("--lockstep", "15") as sim:
@@ -103,4 +115,4 @@ def the_longest_duration_aborts():
 
 if __name__ == "__main__":
     run([by_hand_and_only_when_there_is_a_test, the_longest_duration_aborts, a_command_is_told_what_ended,
-         a_coil_of_the_module_is_cleared, a_stop_that_fails_is_said, keep_measuring_declares_and_goes_on])
+         a_broken_sensor_that_alone_holds_the_test_is_said, a_coil_of_the_module_is_cleared, a_stop_that_fails_is_said, keep_measuring_declares_and_goes_on])

@@ -44,8 +44,11 @@ TEST(StopRule, ARequiredChannelThatDoesNotMeasureHoldsTheTestAndIsNamed) {
         const std::vector verdicts{channel("T2", ChannelState::declared), channel("T3", state)};
         const auto held = decide_stop(verdicts, {true, true}, 90.0);
         EXPECT_FALSE(held.stop);
+        EXPECT_TRUE(held.held);
         EXPECT_THAT(held.reason, HasSubstr("T3 is " + std::string(to_string(state))));
         EXPECT_TRUE(decide_stop(verdicts, {true, false}, 90.0).stop);
+        const std::vector early{channel("T2", ChannelState::measuring), channel("T3", state)};
+        EXPECT_FALSE(decide_stop(early, {true, true}, 90.0).held) << "T2 is waited for as well";
     }
 }
 

@@ -10,6 +10,7 @@ namespace thermbal {
 
 struct StopDecision {
     bool stop = false;
+    bool held = false;                 ///< by sensors that do not measure alone: a person decides
     std::string reason;                ///< what holds, or what is waited for
     std::vector<std::string> waiting;  ///< required channels that are still measured
 };
