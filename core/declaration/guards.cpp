@@ -221,13 +221,13 @@ bool is_stuck(const GuardEvidence& evidence, const GuardOptions& options) {
     const std::span<const double> values = evidence.samples.values;
     const std::size_t start = start_of_last_run(values);
     const std::span<const double> run = values.subspan(start);
-    const auto scans_per_min = 60.0 / evidence.window.period_s;
-    if (static_cast<double>(run.size()) < options.stuck_min * scans_per_min) return false;
-    if (median_move_C(evidence.window, start) >= options.stuck_rise_C) return true;
+    const double long_scans = options.stuck_min * 60.0 / evidence.window.period_s;
     const auto readings = std::ranges::count_if(run, [](double value) { return std::isfinite(value); });
-    return static_cast<double>(readings) >= options.stuck_min * scans_per_min * options.good_share &&
-           static_cast<double>(start) >= options.stuck_min * scans_per_min &&
-           noise_shows(values.first(start));
+    if (static_cast<double>(readings) < options.good_share * long_scans ||
+        static_cast<double>(run.size()) < long_scans)
+        return false;
+    return median_move_C(evidence.window, start) >= options.stuck_rise_C ||
+           (static_cast<double>(start) >= long_scans && noise_shows(values.first(start)));
 }
 
 }  // namespace

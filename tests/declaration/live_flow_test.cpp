@@ -98,6 +98,14 @@ TEST(LiveFlow, DeadAndStuckChannelsHaveStatesOfTheirOwn) {
     EXPECT_NE(verdict->channels[0].state, ChannelState::stuck);
 }
 
+TEST(LiveFlow, ASensorThatFallsSilentIsDeadAndNotStuckAtItsLastReading) {
+    TestWindow window = exponentials(300, rises_C, 5);
+    for (std::size_t k = 100; k < 300; ++k) window.channels[2].values[k] = no_value;
+    const auto verdict = LiveFlow(quick()).identify(window, {}, sequential_for, never);
+    ASSERT_TRUE(verdict);
+    EXPECT_EQ(verdict->channels[1].state, ChannelState::dead) << verdict->channels[1].reason;
+}
+
 TEST(LiveFlow, ASensorWhoseNoiseStopsIsStuckThoughTheMachineRests) {
     constexpr std::size_t scans = 1200;
     constexpr std::size_t since = scans - 80;  // 20 min, more than four time constants after the start
