@@ -29,8 +29,6 @@ constexpr std::size_t most_kept_numbers = 500'000;  ///< 4 MB
 /// (README.md): never below 0.89.
 constexpr double below_linear = 0.8;
 
-/// A window that no linear predictor follows to so many epsilons is noise.
-constexpr double noise_in_epsilons = 3.0;
 /// A column is worse when its least rough error is so much above the least of all.
 constexpr double worse_column = 1.03;
 constexpr int most_worse_in_a_row = 2;
@@ -105,7 +103,7 @@ class GridSearch {
     }
 
   private:
-    bool is_noise() const { return noise_rmse_ > noise_in_epsilons * options_.epsilon; }
+    bool is_noise() const { return noise_of(noise_rmse_, options_.epsilon) != Noise::none; }
 
     /// Where all points of the grid lie within a factor of two, a rough ranking by all folds costs less than
     /// one fold to the end. From wide kernels to narrow ones, until two in a row are worse and ever more so.
@@ -177,10 +175,10 @@ class GridSearch {
 
     Result<void> cross_validate(const SigmaCandidate& candidate) {
         let_go_of_others(candidate.sigma_index);
-        const auto mse =
-            columns_[candidate.sigma_index].mean_mse(candidate, terms_against(candidate), cancelled_);
-        if (!mse) return std::unexpected(mse.error());
-        if (*mse) offer(**mse, candidate.sigma_index, candidate.C_index);
+        const auto raced =
+            columns_[candidate.sigma_index].race(candidate, terms_against(candidate), cancelled_);
+        if (!raced) return std::unexpected(raced.error());
+        if (*raced) offer(**raced, candidate.sigma_index, candidate.C_index);
         return {};
     }
 
@@ -190,6 +188,8 @@ class GridSearch {
         const double of_first = candidate.rough_rmse / std::sqrt(static_cast<double>(folds_.size()));
         return {.bound = best_mean_mse_,
                 .least_rmse = least_rmse_,
+                .noise = noise_of(noise_rmse_, options_.epsilon),
+                .best_by_smoothing = best_by_smoothing_,
                 .small_rmse = is_noise() ? std::min(std::sqrt(best_mean_mse_), of_first) : 0.0};
     }
 
@@ -203,10 +203,12 @@ class GridSearch {
         }
     }
 
-    void offer(double mean_mse, std::size_t sigma, std::size_t C) {
+    void offer(const RaceResult& raced, std::size_t sigma, std::size_t C) {
+        const double mean_mse = raced.mean_mse;
         const bool earlier = sigma < best_sigma_ || (sigma == best_sigma_ && C < best_C_);
         if (mean_mse > best_mean_mse_ || (mean_mse == best_mean_mse_ && !earlier)) return;
         best_mean_mse_ = mean_mse;
+        best_by_smoothing_ = raced.by_smoothing;
         best_sigma_ = sigma;
         best_C_ = C;
     }
@@ -221,6 +223,7 @@ class GridSearch {
     std::vector<SigmaCandidate> waiting_;
     std::vector<double> least_by_column_;  ///< from the widest kernel on
     double best_mean_mse_ = std::numeric_limits<double>::infinity();
+    std::vector<double> best_by_smoothing_;
     std::size_t best_sigma_ = 0;
     std::size_t best_C_ = 0;
 };
@@ -246,9 +249,9 @@ Result<std::vector<double>> cross_validate_low_rank(const LagProblem& problem, c
         if (!candidates) return std::unexpected(candidates.error());
         std::ranges::sort(*candidates, {}, &SigmaCandidate::C_index);
         for (const SigmaCandidate& candidate : *candidates) {
-            const auto mse = column.mean_mse(candidate, everything, cancelled);
-            if (!mse) return std::unexpected(mse.error());
-            all.push_back(**mse);
+            const auto raced = column.race(candidate, everything, cancelled);
+            if (!raced) return std::unexpected(raced.error());
+            all.push_back((*raced)->mean_mse);
         }
     }
     return all;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "race_bounds.hpp"
 
@@ -18,7 +19,11 @@ constexpr double rough_tolerance_factor = 100.0;
 constexpr double rough_truncation_share = 0.3;
 constexpr std::array first_smoothings{0.03, 0.003};
 constexpr double next_folds_smoothing = 0.01;
-constexpr int most_lost_in_a_row = 3;
+/// So many C beyond the margin, the error growing, and larger ones are left out. Where the noise is weak or
+/// the lags are few, an error may fall again after it has grown (README.md).
+int most_lost_in_a_row(Noise noise, std::size_t lags) {
+    return noise == Noise::strong && lags > 10 ? 1 : 3;
+}
 
 /// A tenth of the error to beat, as far as that is known.
 double rough_smoothing(double rmse, double widest) {
@@ -35,6 +40,16 @@ RoughFit fit_roughly(HeldOutFold& fold, double last_smoothing) {
     if (first_smoothings[1] > last_smoothing) static_cast<void>(fold.rmse_at(first_smoothings[1]));
     const double rmse = fold.rmse_at(last_smoothing);
     return {rmse, lowest_rmse(rmse, before, last_smoothing)};
+}
+
+/// By as many folds as both have.
+bool is_above(const std::vector<double>& a, const std::vector<double>& b) {
+    const std::size_t common = std::min(a.size(), b.size());
+    const auto square_sum = [common](const std::vector<double>& rmse) {
+        return std::inner_product(rmse.begin(), rmse.begin() + static_cast<std::ptrdiff_t>(common),
+                                  rmse.begin(), 0.0);
+    };
+    return square_sum(a) > square_sum(b);
 }
 
 TubeSolver::State padded(TubeSolver::State state, Index rank) {
@@ -86,7 +101,7 @@ Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(double best_
                               .lowest_rmse = fit.lowest_rmse,
                               .coefficient_sum = coefficients.lpNorm<1>(),
                               .rough_mean_mse = 0.0,
-                              .rough_state = state});
+                              .rough_states = {state}});
         if (skip_hopeless && grows && fit.rmse > hopeless) break;
     }
     kernel_ = fitted_->take_kernel();
@@ -105,8 +120,10 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
     SigmaCandidate fit;
     fit.sigma_index = sigma_index_;
     RoughRanking ranking{.candidates = {}, .least_mean_mse = std::numeric_limits<double>::infinity()};
+    const int most_lost = most_lost_in_a_row(noise_of(noise_rmse, options_.epsilon), problem_.lags);
     int lost_in_a_row = 0;
-    for (std::size_t k = 0; k < options_.C_grid.size() && lost_in_a_row < most_lost_in_a_row; ++k) {
+    std::vector<double> before;
+    for (std::size_t k = 0; k < options_.C_grid.size() && lost_in_a_row < most_lost; ++k) {
         if (cancelled()) return sweep_cancelled();
         const double needed = truncation(rough_truncation_share, noise_rmse, largest_sum, finest);
         if (needed < tolerance) {
@@ -114,15 +131,14 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
             fitted_ = std::make_unique<FoldsOnFeatures>(factorisation.features(tolerance), folds_, targets_,
                                                         options_.epsilon);
         }
-        if (k == 0) fit.rough_state = (*fitted_)[0].solver().cold_start();
-        const double before = fit.rough_rmse;
+        if (k == 0) fit.rough_states = {(*fitted_)[0].solver().cold_start()};
         const double limit_mse = margin() * margin() * least_mse;
         fit.C_index = k;
-        fit_all_folds(fit, smoothing, limit_mse);
+        std::vector<double> fold_rmse = fit_all_folds(fit, smoothing, limit_mse);
         const bool lost = fit.rough_mean_mse > limit_mse;
-        const bool grows = k > 0 && fit.rough_rmse > before;
         if (!lost) ranking.candidates.push_back(fit);
-        lost_in_a_row = lost && grows ? lost_in_a_row + 1 : 0;
+        lost_in_a_row = lost && is_above(fold_rmse, before) ? lost_in_a_row + 1 : 0;
+        before = std::move(fold_rmse);
         ranking.least_mean_mse = std::min(ranking.least_mean_mse, fit.rough_mean_mse);
         least_mse = std::min(least_mse, fit.rough_mean_mse);
         if (k + 1 < options_.C_grid.size()) {
@@ -134,24 +150,29 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
     return ranking;
 }
 
-/// Goes on from fit.rough_state. Every fold only adds to the mean: beyond the limit it is left as it is.
-void RoughColumn::fit_all_folds(SigmaCandidate& fit, double smoothing, double limit_mse) {
+/// Goes on from the first of fit.rough_states. Every fold only adds to the mean: beyond the limit it is left
+/// as it is. Fold by fold, the root of the mean squared error.
+std::vector<double> RoughColumn::fit_all_folds(SigmaCandidate& fit, double smoothing, double limit_mse) {
     const double C = options_.C_grid[fit.C_index] * static_cast<double>(stride_);
     HeldOutFold& first = (*fitted_)[0];
-    first.start(C, padded(fit.rough_state, fitted_->kernel().by_row.rows()));
+    first.start(C, padded(fit.rough_states.front(), fitted_->kernel().by_row.rows()));
     fit.rough_rmse = fit_roughly(first, smoothing).rmse;
-    fit.rough_state = first.solver().state();
+    fit.rough_states = {first.solver().state()};
     fit.coefficient_sum = first.solver().coefficients().lpNorm<1>();
     const auto count = static_cast<double>(folds_.size());
+    std::vector<double> fold_rmse{fit.rough_rmse};
     double sum = fit.rough_rmse * fit.rough_rmse;
     for (std::size_t f = 1; f < folds_.size() && sum <= limit_mse * count; ++f) {
         HeldOutFold& fold = (*fitted_)[f];
-        fold.start(C, fit.rough_state);
+        fold.start(C, fit.rough_states.front());
         if (smoothing < next_folds_smoothing) static_cast<void>(fold.rmse_at(next_folds_smoothing));
         const double rmse = fold.rmse_at(smoothing);
         sum += rmse * rmse;
+        fold_rmse.push_back(rmse);
+        fit.rough_states.push_back(fold.solver().state());
     }
     fit.rough_mean_mse = sum / count;
+    return fold_rmse;
 }
 
 TubeSolver::State RoughColumn::on(const KernelFeatures& kernel, const TubeSolver::State& rough) const {

@@ -19,11 +19,11 @@ namespace thermbal {
 struct SigmaCandidate {
     std::size_t sigma_index = 0;
     std::size_t C_index = 0;
-    double rough_rmse = 0.0;       ///< of the first fold
-    double lowest_rmse = 0.0;      ///< below which the first fold's error will not fall
-    double coefficient_sum = 0.0;  ///< of |alpha - alpha*|, about that of all rows
-    double rough_mean_mse = 0.0;   ///< over all folds, from rank_by_all_folds() alone
-    TubeSolver::State rough_state;
+    double rough_rmse = 0.0;                      ///< of the first fold
+    double lowest_rmse = 0.0;                     ///< below which the first fold's error will not fall
+    double coefficient_sum = 0.0;                 ///< of |alpha - alpha*|, about that of all rows
+    double rough_mean_mse = 0.0;                  ///< over all folds, from rank_by_all_folds() alone
+    std::vector<TubeSolver::State> rough_states;  ///< fold by fold, as far as they have been fitted
 };
 
 /// What rank_by_all_folds() found at one sigma.
@@ -46,8 +46,8 @@ class RoughColumn {
                                                            const Cancelled& cancelled);
 
     /// All folds, from the smallest C up, for windows of noise: `noise_rmse` is about what no error falls
-    /// below. Whose mean is beyond the margin from `least_mse` is no candidate; after three such in a row,
-    /// the error growing, larger C are left out. Error: stop when cancelled.
+    /// below. Whose mean is beyond the margin from `least_mse` is no candidate; after one or three such in a
+    /// row where the noise is weak), the error growing, larger C are left out. Error: stop when cancelled.
     Result<RoughRanking> rank_by_all_folds(double noise_rmse, double least_mse, const Cancelled& cancelled);
 
     /// On windows of noise the point that wins on all rows is among those whose rough error is at most this
@@ -58,7 +58,7 @@ class RoughColumn {
     TubeSolver::State on(const KernelFeatures& kernel, const TubeSolver::State& rough) const;
 
   private:
-    void fit_all_folds(SigmaCandidate& candidate, double smoothing, double limit_mse);
+    std::vector<double> fit_all_folds(SigmaCandidate& candidate, double smoothing, double limit_mse);
 
     const LagProblem& problem_;
     std::size_t sigma_index_;

@@ -3,11 +3,13 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "held_out_fold.hpp"
+#include "race_bounds.hpp"
 #include "regression/folds.hpp"
 #include "regression/kernel_features.hpp"
 #include "regression/lags.hpp"
@@ -21,9 +23,19 @@ namespace thermbal {
 struct RaceTerms {
     double bound = 0.0;                     ///< the mean squared error to beat
     const std::vector<double>& least_rmse;  ///< what no error is expected to fall below, fold by fold
+    Noise noise = Noise::none;
+    /// Of the best candidate so far, RaceResult::by_smoothing.
+    std::span<const double> best_by_smoothing{};
     /// An error that is small here: what moves predictions by a few hundredths of it does not matter. 0: as
     /// precise as can be.
     double small_rmse = 0.0;
+};
+
+/// Of a candidate that came to the end: the mean squared error over folds, at the last smoothing and after
+/// each.
+struct RaceResult {
+    double mean_mse = 0.0;
+    std::vector<double> by_smoothing;
 };
 
 /// Cross-validation of every C at one sigma. The arguments must outlive it; one object a thread.
@@ -34,12 +46,11 @@ class SigmaColumn {
 
     RoughColumn& rough() { return rough_; }
 
-    /// The mean over folds, or nothing as soon as it is sure to be above terms.bound. Error: stop when
-    /// cancelled.
-    Result<std::optional<double>> mean_mse(const SigmaCandidate& candidate, const RaceTerms& terms,
+    /// Nothing as soon as the mean is sure to end above terms.bound. Error: stop when cancelled.
+    Result<std::optional<RaceResult>> race(const SigmaCandidate& candidate, const RaceTerms& terms,
                                            const Cancelled& cancelled);
 
-    /// What is kept between calls of mean_mse(), in numbers; and lets go of it: the next call makes it again.
+    /// What is kept between calls of race(), in numbers; and lets go of it: the next call makes it again.
     std::size_t kept_numbers() const;
     void release();
 
