@@ -1,6 +1,7 @@
 #include "regression/newton_system.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <numeric>
 #include <span>
@@ -19,6 +20,9 @@ namespace {
 constexpr int most_changes = 64;
 
 constexpr std::size_t height = PanelMatrix::height;
+
+/// So many rows have all their products with one another kept: 5 MB.
+constexpr std::size_t most_rows_multiplied_once = 800;
 
 /// So many rows' features at a time: they stay in the cache while they are multiplied.
 constexpr std::size_t gathered_at_once = 64;
@@ -63,6 +67,13 @@ void gather_rows(const MatrixXd& by_row, std::span<const Index> rows, PanelMatri
         const double* const features = by_row.col(rows[i]).data();
         double* const lane = out.panel(i / height) + i % height;
         for (std::size_t f = 0; f < rank; ++f) lane[f * height] = features[f];
+    }
+}
+
+/// Zeros in the rows and columns from `count` on.
+void clear_padding(PanelMatrix& lower, std::size_t count) {
+    for (std::size_t i = count; i < lower.padded_rows(); ++i) {
+        for (std::size_t j = 0; j <= i; ++j) lower.at(i, j) = 0.0;
     }
 }
 
@@ -132,6 +143,7 @@ void FeatureGram::add(const MatrixXd& by_row, const std::vector<Index>& rows, do
 }
 
 const PanelMatrix& RowGram::over(const MatrixXd& by_row, const std::vector<Index>& bending) {
+    if (static_cast<std::size_t>(by_row.cols()) <= most_rows_multiplied_once) return picked(by_row, bending);
     find_kept_and_fresh(bending);
     if (fresh_.empty() && kept_.size() == rows_.size()) return products_;
     if (!fresh_.empty()) gather_rows(by_row, bending, all_by_row_);
@@ -143,6 +155,41 @@ const PanelMatrix& RowGram::over(const MatrixXd& by_row, const std::vector<Index
     }
     rows_ = bending;
     return products_;
+}
+
+const PanelMatrix& RowGram::picked(const MatrixXd& by_row, const std::vector<Index>& bending) {
+    if (of_all_.size() == 0) multiply_all(by_row);
+    const std::size_t count = bending.size();
+    products_.resize_lower(count);
+    for (std::size_t p = 0; p < products_.panels(); ++p) {
+        const std::size_t first = p * height;
+        std::array<Index, height> rows{};
+        for (std::size_t lane = 0; lane < height; ++lane)
+            rows[lane] = bending[std::min(first + lane, count - 1)];
+        for (std::size_t j = 0; j < std::min(first + height, count); ++j) {
+            const double* const column = of_all_.col(bending[j]).data();
+            double* const eight = products_.eight(p, j);
+            for (std::size_t lane = 0; lane < height; ++lane) eight[lane] = column[rows[lane]];
+        }
+    }
+    clear_padding(products_, count);
+    return products_;
+}
+
+void RowGram::multiply_all(const MatrixXd& by_row) {
+    std::vector<Index> rows(static_cast<std::size_t>(by_row.cols()));
+    std::iota(rows.begin(), rows.end(), Index{0});
+    gather_rows(by_row, rows, all_by_row_);
+    PanelMatrix lower;
+    lower.set_zero_lower(rows.size());
+    add_products(all_by_row_, 1.0, lower);
+    of_all_.resize(by_row.cols(), by_row.cols());
+    for (Index j = 0; j < by_row.cols(); ++j) {
+        for (Index i = j; i < by_row.cols(); ++i) {
+            of_all_(i, j) = of_all_(j, i) =
+                lower.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
+        }
+    }
 }
 
 void RowGram::find_kept_and_fresh(const std::vector<Index>& bending) {
@@ -212,12 +259,13 @@ void NewtonSystem::in_row_space(const std::vector<Index>& bending, double curvat
     without_bias_.setZero(static_cast<Index>(system_.padded_rows()));
     vector_loops::multiply_rows(by_row_.data(), rank, bending, gradient.data(), 0.0, without_bias_.data());
     without_bias_ *= -1.0;
-    factor_.solve(without_bias_.data());
+    factor_.solve_lower(without_bias_.data());
     of_bias_.setZero(without_bias_.size());
     of_bias_.head(rows).setOnes();
-    factor_.solve(of_bias_.data());
-    direction.bias = (-bias_gradient - without_bias_.sum()) / of_bias_.sum();
+    factor_.solve_lower(of_bias_.data());
+    direction.bias = (-bias_gradient - of_bias_.dot(without_bias_)) / of_bias_.squaredNorm();
     without_bias_ = -without_bias_ - direction.bias * of_bias_;
+    factor_.solve_upper(without_bias_.data());
     direction.weights = -gradient;
     vector_loops::add_rows(by_row_.data(), rank, bending, {without_bias_.data(), bending.size()},
                            direction.weights.data());

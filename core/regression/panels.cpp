@@ -59,23 +59,38 @@ void add_block(const double* a, const double* b, std::size_t depth, double sign,
     add_block_by<TwoLanes, 2>(a, b, depth, sign, block);
 }
 
+/// Eight columns side by side, each in a register.
+using Block = std::array<EightLanes, height>;
+
 /// block = block * L'^-1, L the lower triangle of eight columns side by side.
 THERMBAL_EVERY_WIDTH
 void solve_block(const double* __restrict L, const double* __restrict inverse_diagonal,
                  double* __restrict block) {
+    Block columns;
+    std::memcpy(columns.data(), block, sizeof columns);
+#pragma GCC unroll 8
     for (std::size_t c = 0; c < height; ++c) {
-        std::array<double, height> column;
-        std::memcpy(column.data(), block + c * height, sizeof column);
-        for (std::size_t d = 0; d < c; ++d) {
-            const double factor = L[d * height + c];
-            for (std::size_t lane = 0; lane < height; ++lane) {
-                column[lane] -= factor * block[d * height + lane];
-            }
-        }
-        for (std::size_t lane = 0; lane < height; ++lane) {
-            block[c * height + lane] = column[lane] * inverse_diagonal[c];
-        }
+        columns[c] *= inverse_diagonal[c];
+#pragma GCC unroll 8
+        for (std::size_t d = c + 1; d < height; ++d) columns[d] -= L[c * height + d] * columns[c];
     }
+    std::memcpy(block, columns.data(), sizeof columns);
+}
+
+/// The Cholesky factor of eight columns on the diagonal, in place. What lies above the diagonal goes along,
+/// and nothing comes of it.
+THERMBAL_EVERY_WIDTH
+void factor_block(double* __restrict block, double* __restrict inverse_diagonal) {
+    Block columns;
+    std::memcpy(columns.data(), block, sizeof columns);
+#pragma GCC unroll 8
+    for (std::size_t c = 0; c < height; ++c) {
+        inverse_diagonal[c] = 1.0 / std::sqrt(columns[c][c]);
+        columns[c] *= inverse_diagonal[c];
+#pragma GCC unroll 8
+        for (std::size_t d = c + 1; d < height; ++d) columns[d] -= columns[c][d] * columns[c];
+    }
+    std::memcpy(block, columns.data(), sizeof columns);
 }
 
 /// out(lane) -= sum over j of panel(lane, j) x(j).
@@ -165,7 +180,7 @@ void PanelCholesky::factor(PanelMatrix& lower) {
         for (std::size_t p = q; p < lower.panels(); ++p) {
             add_block(lower.panel(p), lower.panel(q), done, -1.0, lower.eight(p, done));
             if (p == q) {
-                factor_diagonal(q);
+                factor_block(lower.eight(q, done), inverse_diagonal_.data() + done);
             } else {
                 solve_block(lower.eight(q, done), inverse_diagonal_.data() + done, lower.eight(p, done));
             }
@@ -173,21 +188,12 @@ void PanelCholesky::factor(PanelMatrix& lower) {
     }
 }
 
-void PanelCholesky::factor_diagonal(std::size_t p) {
-    const std::size_t first = p * height;
-    double* const block = lower_->eight(p, first);
-    for (std::size_t c = 0; c < height; ++c) {
-        for (std::size_t d = 0; d < c; ++d) {
-            const double factor = block[d * height + c];
-            for (std::size_t i = c; i < height; ++i) block[c * height + i] -= factor * block[d * height + i];
-        }
-        const double diagonal = std::sqrt(block[c * height + c]);
-        inverse_diagonal_[first + c] = 1.0 / diagonal;
-        for (std::size_t i = c; i < height; ++i) block[c * height + i] *= inverse_diagonal_[first + c];
-    }
+void PanelCholesky::solve(double* x) {
+    solve_lower(x);
+    solve_upper(x);
 }
 
-void PanelCholesky::solve(double* x) {
+void PanelCholesky::solve_lower(double* x) const {
     const PanelMatrix& lower = *lower_;
     for (std::size_t p = 0; p < lower.panels(); ++p) {
         const std::size_t first = p * height;
@@ -198,6 +204,10 @@ void PanelCholesky::solve(double* x) {
             for (std::size_t i = c + 1; i < height; ++i) x[first + i] -= block[c * height + i] * x[first + c];
         }
     }
+}
+
+void PanelCholesky::solve_upper(double* x) {
+    const PanelMatrix& lower = *lower_;
     pending_.assign(lower.padded_rows() * height, 0.0);
     for (std::size_t p = lower.panels(); p-- > 0;) {
         const std::size_t first = p * height;

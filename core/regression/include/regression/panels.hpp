@@ -59,10 +59,11 @@ class PanelCholesky {
     void factor(PanelMatrix& lower);
     /// x = A^-1 x, padded_rows() numbers.
     void solve(double* x);
+    /// Its two halves: x = L^-1 x and x = L'^-1 x, where A = L L'.
+    void solve_lower(double* x) const;
+    void solve_upper(double* x);
 
   private:
-    void factor_diagonal(std::size_t p);
-
     PanelMatrix* lower_ = nullptr;
     std::vector<double> inverse_diagonal_;
     std::vector<double> pending_;
