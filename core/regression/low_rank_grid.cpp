@@ -29,6 +29,8 @@ constexpr std::size_t most_kept_numbers = 500'000;  ///< 4 MB
 /// (README.md): never below 0.89.
 constexpr double below_linear = 0.8;
 
+/// A window that no linear predictor follows to so many epsilons is noise.
+constexpr double noise_in_epsilons = 3.0;
 /// A column is worse when its least rough error is so much above the least of all.
 constexpr double worse_column = 1.03;
 constexpr int most_worse_in_a_row = 2;
@@ -103,7 +105,7 @@ class GridSearch {
     }
 
   private:
-    bool is_noise() const { return noise_of(noise_rmse_, options_.epsilon) != Noise::none; }
+    bool is_noise() const { return noise_rmse_ > noise_in_epsilons * options_.epsilon; }
 
     /// Where all points of the grid lie within a factor of two, a rough ranking by all folds costs less than
     /// one fold to the end. From wide kernels to narrow ones, until two in a row are worse and ever more so.
@@ -188,7 +190,7 @@ class GridSearch {
         const double of_first = candidate.rough_rmse / std::sqrt(static_cast<double>(folds_.size()));
         return {.bound = best_mean_mse_,
                 .least_rmse = least_rmse_,
-                .noise = noise_of(noise_rmse_, options_.epsilon),
+                .noise_rmse = is_noise() ? noise_rmse_ : 0.0,
                 .best_by_smoothing = best_by_smoothing_,
                 .small_rmse = is_noise() ? std::min(std::sqrt(best_mean_mse_), of_first) : 0.0};
     }

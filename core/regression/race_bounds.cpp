@@ -4,18 +4,6 @@
 #include <cmath>
 
 namespace thermbal {
-namespace {
-
-constexpr double weak_in_epsilons = 3.0;
-constexpr double strong_in_epsilons = 20.0;
-
-}  // namespace
-
-Noise noise_of(double noise_rmse, double epsilon) {
-    if (noise_rmse > strong_in_epsilons * epsilon) return Noise::strong;
-    return noise_rmse > weak_in_epsilons * epsilon ? Noise::weak : Noise::none;
-}
-
 /// Measured on 20 000 fits of warm-ups, noise, gaps and cycles (README.md): one in 200 falls lower, by a few
 /// hundredths.
 double lowest_rmse(double rmse, double before, double smoothing) {

@@ -4,14 +4,6 @@
 
 namespace thermbal {
 
-/// Of a window: how far the best linear predictor stays from it.
-enum class Noise {
-    none,    ///< up to 3 epsilon
-    weak,    ///< up to 20
-    strong,  ///< beyond
-};
-Noise noise_of(double noise_rmse, double epsilon);
-
 /// Below what a held-out error will not fall when the smoothing goes on to 0, from what the last step of
 /// smoothing has done.
 double lowest_rmse(double rmse, double before, double smoothing);

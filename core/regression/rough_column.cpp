@@ -19,10 +19,11 @@ constexpr double rough_tolerance_factor = 100.0;
 constexpr double rough_truncation_share = 0.3;
 constexpr std::array first_smoothings{0.03, 0.003};
 constexpr double next_folds_smoothing = 0.01;
-/// So many C beyond the margin, the error growing, and larger ones are left out. Where the noise is weak or
-/// the lags are few, an error may fall again after it has grown (README.md).
-int most_lost_in_a_row(Noise noise, std::size_t lags) {
-    return noise == Noise::strong && lags > 10 ? 1 : 3;
+/// Up to so much noise, or with so few lags, an error may fall again after it has grown with C (README.md).
+constexpr double weak_noise_in_epsilons = 10.0;
+constexpr std::size_t few_lags = 10;
+int most_lost_in_a_row(double noise_in_epsilons, std::size_t lags) {
+    return noise_in_epsilons > weak_noise_in_epsilons && lags > few_lags ? 1 : 3;
 }
 
 /// A tenth of the error to beat, as far as that is known.
@@ -120,7 +121,7 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
     SigmaCandidate fit;
     fit.sigma_index = sigma_index_;
     RoughRanking ranking{.candidates = {}, .least_mean_mse = std::numeric_limits<double>::infinity()};
-    const int most_lost = most_lost_in_a_row(noise_of(noise_rmse, options_.epsilon), problem_.lags);
+    const int most_lost = most_lost_in_a_row(noise_rmse / options_.epsilon, problem_.lags);
     int lost_in_a_row = 0;
     std::vector<double> before;
     for (std::size_t k = 0; k < options_.C_grid.size() && lost_in_a_row < most_lost; ++k) {

@@ -9,7 +9,6 @@
 #include <Eigen/Core>
 
 #include "held_out_fold.hpp"
-#include "race_bounds.hpp"
 #include "regression/folds.hpp"
 #include "regression/kernel_features.hpp"
 #include "regression/lags.hpp"
@@ -23,7 +22,7 @@ namespace thermbal {
 struct RaceTerms {
     double bound = 0.0;                     ///< the mean squared error to beat
     const std::vector<double>& least_rmse;  ///< what no error is expected to fall below, fold by fold
-    Noise noise = Noise::none;
+    double noise_rmse = 0.0;  ///< of a window of noise: about what no error falls below; 0 elsewhere
     /// Of the best candidate so far, RaceResult::by_smoothing.
     std::span<const double> best_by_smoothing{};
     /// An error that is small here: what moves predictions by a few hundredths of it does not matter. 0: as
