@@ -55,7 +55,7 @@ class SigmaColumn {
 
   private:
     void truncate_at(double tolerance);
-    void start_fold(std::size_t f, const SigmaCandidate& candidate);
+    double start_fold(std::size_t f, const SigmaCandidate& candidate);
 
     const LagProblem& problem_;
     double sigma_;
