@@ -19,11 +19,11 @@ namespace thermbal {
 struct SigmaCandidate {
     std::size_t sigma_index = 0;
     std::size_t C_index = 0;
-    double rough_rmse = 0.0;                      ///< of the first fold
-    double lowest_rmse = 0.0;                     ///< below which the first fold's error will not fall
-    double coefficient_sum = 0.0;                 ///< of |alpha - alpha*|, about that of all rows
-    double rough_mean_mse = 0.0;                  ///< over all folds, from rank_by_all_folds() alone
-    std::vector<TubeSolver::State> rough_states;  ///< fold by fold, as far as they have been fitted
+    double rough_rmse = 0.0;       ///< of the first fold
+    double lowest_rmse = 0.0;      ///< below which the first fold's error will not fall
+    double coefficient_sum = 0.0;  ///< of |alpha - alpha*|, about that of all rows
+    double rough_mean_mse = 0.0;   ///< over all folds, from rank_by_all_folds() alone
+    TubeSolver::State rough_state;
 };
 
 /// What rank_by_all_folds() found at one sigma.

@@ -150,7 +150,7 @@ double SigmaColumn::start_fold(std::size_t f, const SigmaCandidate& candidate) {
     const double C = options_.C_grid[candidate.C_index];
     HeldOutFold& fold = (*fitted_)[f];
     if (f == 0) {
-        fold.start(C, rough_.on(fitted_->kernel(), candidate.rough_states.front()));
+        fold.start(C, rough_.on(fitted_->kernel(), candidate.rough_state));
         return fold.rmse_at(smoothings.front());
     }
     fold.start(C, (*fitted_)[0].solver().state());
