@@ -10,8 +10,11 @@ namespace thermbal {
 namespace {
 
 constexpr double fine_tolerance_factor = 10.0;
-/// Of the error to beat, in the predictions. Measured on noise, where the rank is large (README.md).
-constexpr double truncation_share = 0.1;
+/// Of the error to beat, what the truncation of a kernel may move a prediction by at the very most. Where the
+/// rows are many, their parts of it cancel (README.md).
+double truncation_share(std::size_t rows) {
+    return rows < 800 ? 0.1 : 1.0;
+}
 
 /// What is chosen by: a smoothing moves a prediction by about as much as it is wide.
 constexpr double across_folds_smoothing = 1e-2;
@@ -96,7 +99,7 @@ Result<std::optional<RaceResult>> SigmaColumn::race(const SigmaCandidate& candid
     RaceResult result;
     Race race(candidate, terms.least_rmse);
     if (race.is_lost(terms.bound)) return std::nullopt;
-    truncate_at(truncation(truncation_share, terms.small_rmse, candidate.coefficient_sum,
+    truncate_at(truncation(truncation_share(problem_.rows()), terms.small_rmse, candidate.coefficient_sum,
                            fine_tolerance_factor * feature_tolerance(sigma_)));
     // On noise all folds are started before one goes on: most candidates are left behind there.
     const bool all_at_once = terms.noise_rmse > 0.0;
