@@ -191,7 +191,7 @@ class GridSearch {
         return {.bound = best_mean_mse_,
                 .least_rmse = least_rmse_,
                 .noise_rmse = is_noise() ? noise_rmse_ : 0.0,
-                .best_by_smoothing = best_by_smoothing_,
+                .best_by_stage = best_by_stage_,
                 .small_rmse = is_noise() ? std::min(std::sqrt(best_mean_mse_), of_first) : 0.0};
     }
 
@@ -210,7 +210,7 @@ class GridSearch {
         const bool earlier = sigma < best_sigma_ || (sigma == best_sigma_ && C < best_C_);
         if (mean_mse > best_mean_mse_ || (mean_mse == best_mean_mse_ && !earlier)) return;
         best_mean_mse_ = mean_mse;
-        best_by_smoothing_ = raced.by_smoothing;
+        best_by_stage_ = raced.by_stage;
         best_sigma_ = sigma;
         best_C_ = C;
     }
@@ -225,7 +225,7 @@ class GridSearch {
     std::vector<SigmaCandidate> waiting_;
     std::vector<double> least_by_column_;  ///< from the widest kernel on
     double best_mean_mse_ = std::numeric_limits<double>::infinity();
-    std::vector<double> best_by_smoothing_;
+    std::vector<double> best_by_stage_;
     std::size_t best_sigma_ = 0;
     std::size_t best_C_ = 0;
 };

@@ -183,11 +183,13 @@ void RowGram::multiply_all(const MatrixXd& by_row) {
     PanelMatrix lower;
     lower.set_zero_lower(rows.size());
     add_products(all_by_row_, 1.0, lower);
-    of_all_.resize(by_row.cols(), by_row.cols());
-    for (Index j = 0; j < by_row.cols(); ++j) {
-        for (Index i = j; i < by_row.cols(); ++i) {
-            of_all_(i, j) = of_all_(j, i) =
-                lower.at(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
+    of_all_.setZero(by_row.cols(), by_row.cols());
+    for (std::size_t p = 0; p < lower.panels(); ++p) {
+        const std::size_t first = p * height;
+        const std::size_t here = std::min(height, rows.size() - first);
+        for (std::size_t j = 0; j < first + here; ++j) {
+            std::memcpy(of_all_.col(static_cast<Index>(j)).data() + first, lower.eight(p, j),
+                        here * sizeof(double));
         }
     }
 }

@@ -102,7 +102,7 @@ Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(double best_
                               .lowest_rmse = fit.lowest_rmse,
                               .coefficient_sum = coefficients.lpNorm<1>(),
                               .rough_mean_mse = 0.0,
-                              .rough_state = state});
+                              .rough_states = {state}});
         if (skip_hopeless && grows && fit.rmse > hopeless) break;
     }
     kernel_ = fitted_->take_kernel();
@@ -132,7 +132,7 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
             fitted_ = std::make_unique<FoldsOnFeatures>(factorisation.features(tolerance), folds_, targets_,
                                                         options_.epsilon);
         }
-        if (k == 0) fit.rough_state = (*fitted_)[0].solver().cold_start();
+        if (k == 0) fit.rough_states = {(*fitted_)[0].solver().cold_start()};
         const double limit_mse = margin() * margin() * least_mse;
         fit.C_index = k;
         std::vector<double> fold_rmse = fit_all_folds(fit, smoothing, limit_mse);
@@ -151,25 +151,26 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
     return ranking;
 }
 
-/// Goes on from fit.rough_state. Every fold only adds to the mean: beyond the limit it is left
+/// Goes on from the first of fit.rough_states. Every fold only adds to the mean: beyond the limit it is left
 /// as it is. Fold by fold, the root of the mean squared error.
 std::vector<double> RoughColumn::fit_all_folds(SigmaCandidate& fit, double smoothing, double limit_mse) {
     const double C = options_.C_grid[fit.C_index] * static_cast<double>(stride_);
     HeldOutFold& first = (*fitted_)[0];
-    first.start(C, padded(fit.rough_state, fitted_->kernel().by_row.rows()));
+    first.start(C, padded(fit.rough_states.front(), fitted_->kernel().by_row.rows()));
     fit.rough_rmse = fit_roughly(first, smoothing).rmse;
-    fit.rough_state = first.solver().state();
+    fit.rough_states = {first.solver().state()};
     fit.coefficient_sum = first.solver().coefficients().lpNorm<1>();
     const auto count = static_cast<double>(folds_.size());
     std::vector<double> fold_rmse{fit.rough_rmse};
     double sum = fit.rough_rmse * fit.rough_rmse;
     for (std::size_t f = 1; f < folds_.size() && sum <= limit_mse * count; ++f) {
         HeldOutFold& fold = (*fitted_)[f];
-        fold.start(C, fit.rough_state);
+        fold.start(C, fit.rough_states.front());
         if (smoothing < next_folds_smoothing) static_cast<void>(fold.rmse_at(next_folds_smoothing));
         const double rmse = fold.rmse_at(smoothing);
         sum += rmse * rmse;
         fold_rmse.push_back(rmse);
+        fit.rough_states.push_back(fold.solver().state());
     }
     fit.rough_mean_mse = sum / count;
     return fold_rmse;

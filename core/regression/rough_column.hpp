@@ -19,11 +19,11 @@ namespace thermbal {
 struct SigmaCandidate {
     std::size_t sigma_index = 0;
     std::size_t C_index = 0;
-    double rough_rmse = 0.0;       ///< of the first fold
-    double lowest_rmse = 0.0;      ///< below which the first fold's error will not fall
-    double coefficient_sum = 0.0;  ///< of |alpha - alpha*|, about that of all rows
-    double rough_mean_mse = 0.0;   ///< over all folds, from rank_by_all_folds() alone
-    TubeSolver::State rough_state;
+    double rough_rmse = 0.0;                      ///< of the first fold
+    double lowest_rmse = 0.0;                     ///< below which the first fold's error will not fall
+    double coefficient_sum = 0.0;                 ///< of |alpha - alpha*|, about that of all rows
+    double rough_mean_mse = 0.0;                  ///< over all folds, from rank_by_all_folds() alone
+    std::vector<TubeSolver::State> rough_states;  ///< of the first fold, and of those fitted after it
 };
 
 /// What rank_by_all_folds() found at one sigma.
@@ -51,9 +51,11 @@ class RoughColumn {
     /// Error: stop when cancelled.
     Result<RoughRanking> rank_by_all_folds(double noise_rmse, double least_mse, const Cancelled& cancelled);
 
+    bool has_all_rows() const { return stride_ == 1; }
+
     /// On windows of noise the point that wins on all rows is among those whose rough error is at most this
     /// much larger than the least. Measured (README.md): up to 1.06, and 1.016 where no row is left out.
-    double margin() const { return stride_ == 1 ? 1.03 : 1.1; }
+    double margin() const { return has_all_rows() ? 1.03 : 1.1; }
 
     /// The same function on other features, which must hold the rows of these.
     TubeSolver::State on(const KernelFeatures& kernel, const TubeSolver::State& rough) const;

@@ -20,20 +20,14 @@ double truncation_share(std::size_t rows) {
 constexpr double across_folds_smoothing = 1e-2;
 constexpr std::array smoothings{1e-3, 1e-4, 1e-5, 1e-6};
 
-/// On noise the last step changes nothing (README.md).
-std::size_t steps_of(const RaceTerms& terms) {
-    return smoothings.size() - (terms.noise_rmse > 0.0 ? 1 : 0);
-}
+/// On noise the last one changes nothing (README.md).
+constexpr std::size_t smoothings_on_noise = smoothings.size() - 1;
 
 /// On noise a candidate so much worse than the best one was at the same smoothing does not win. Measured on
 /// 628 windows (README.md): no winner was worse by more than 0.6 of the smoothing over the noise, 0.02 to
-/// 0.18 of it where the folds have just been started.
-bool is_left_behind(const std::vector<double>& by_smoothing, const RaceTerms& terms) {
-    if (!(terms.noise_rmse > 0.0) || terms.best_by_smoothing.empty()) return false;
-    const std::size_t stage = by_smoothing.size() - 1;
-    const double moves = stage == 0 ? 0.3 * across_folds_smoothing : smoothings[stage - 1];
-    const double margin = 1.0 + moves / terms.noise_rmse;
-    return by_smoothing[stage] > margin * margin * terms.best_by_smoothing[stage];
+/// 0.18 of it at the widest.
+double left_behind(double smoothing, double noise_rmse) {
+    return 1.0 + (smoothing == across_folds_smoothing ? 0.3 : 1.0) * smoothing / noise_rmse;
 }
 
 /// As lowest_rmse(), where no step of smoothing has been seen yet. Measured on 4662 fits (README.md): none
@@ -47,8 +41,10 @@ bool is_worth_keeping(const KernelFeatures& kernel, double tolerance) {
     return 2 * kernel.pivots.size() <= 3 * kernel.rank_at(tolerance) + 16;
 }
 
+}  // namespace
+
 /// A candidate's errors fold by fold as they become known.
-class Race {
+class SigmaColumn::Race {
   public:
     Race(const SigmaCandidate& candidate, const std::vector<double>& least_rmse)
         : least_(least_rmse), rmse_(least_rmse), lowest_(least_rmse) {
@@ -82,8 +78,6 @@ class Race {
     std::vector<double> lowest_;
 };
 
-}  // namespace
-
 SigmaColumn::SigmaColumn(const LagProblem& problem, std::size_t sigma_index, const std::vector<Fold>& folds,
                          const SweepOptions& options, const Eigen::VectorXd& targets)
     : problem_(problem),
@@ -95,38 +89,64 @@ SigmaColumn::SigmaColumn(const LagProblem& problem, std::size_t sigma_index, con
 
 Result<std::optional<RaceResult>> SigmaColumn::race(const SigmaCandidate& candidate, const RaceTerms& terms,
                                                     const Cancelled& cancelled) {
-    const std::size_t steps = steps_of(terms);
-    RaceResult result;
     Race race(candidate, terms.least_rmse);
     if (race.is_lost(terms.bound)) return std::nullopt;
     truncate_at(truncation(truncation_share(problem_.rows()), terms.small_rmse, candidate.coefficient_sum,
                            fine_tolerance_factor * feature_tolerance(sigma_)));
-    // On noise all folds are started before one goes on: most candidates are left behind there.
-    const bool all_at_once = terms.noise_rmse > 0.0;
-    for (std::size_t f = 0; f < folds_.size() && all_at_once; ++f) {
-        if (cancelled()) return sweep_cancelled();
-        race.set_start(f, start_fold(f, candidate));
-        if (race.is_lost(terms.bound)) return std::nullopt;
-    }
-    result.by_smoothing.push_back(race.mean_mse());
-    if (is_left_behind(result.by_smoothing, terms)) return std::nullopt;
-    for (std::size_t step = 0; step < steps; ++step) {
+    return terms.noise_rmse > 0.0 ? all_folds_abreast(candidate, race, terms, cancelled)
+                                  : first_fold_ahead(candidate, race, terms, cancelled);
+}
+
+/// What a step of smoothing does to a fold is not known before it is done: the first fold leads by one.
+Result<std::optional<RaceResult>> SigmaColumn::first_fold_ahead(const SigmaCandidate& candidate, Race& race,
+                                                                const RaceTerms& terms,
+                                                                const Cancelled& cancelled) {
+    for (std::size_t step = 0; step < smoothings.size(); ++step) {
         for (std::size_t f = 0; f < folds_.size(); ++f) {
             if (cancelled()) return sweep_cancelled();
-            if (step == 0 && !all_at_once) {
-                race.set_start(f, start_fold(f, candidate));
+            if (step == 0) {
+                start_fold(f, candidate);
+                race.set_start(f,
+                               (*fitted_)[f].rmse_at(f == 0 ? smoothings.front() : across_folds_smoothing));
                 if (race.is_lost(terms.bound)) return std::nullopt;
             }
-            // The first fold leads by one smoothing: what a step of smoothing does to it is not known before.
             const std::size_t next = f == 0 ? step + 1 : step;
-            if (next == steps) continue;
-            race.set(f, (*fitted_)[f].rmse_at(smoothings[next]), smoothings[next], next + 1 == steps);
+            if (next == smoothings.size()) continue;
+            race.set(f, (*fitted_)[f].rmse_at(smoothings[next]), smoothings[next],
+                     next + 1 == smoothings.size());
             if (race.is_lost(terms.bound)) return std::nullopt;
         }
-        result.by_smoothing.push_back(race.mean_mse());
-        if (is_left_behind(result.by_smoothing, terms)) return std::nullopt;
     }
-    result.mean_mse = race.mean_mse();
+    return RaceResult{race.mean_mse(), {}};
+}
+
+/// On noise most candidates are told from the best one as soon as all folds are at the same smoothing. The
+/// widest is left out where every fold is there already.
+Result<std::optional<RaceResult>> SigmaColumn::all_folds_abreast(const SigmaCandidate& candidate, Race& race,
+                                                                 const RaceTerms& terms,
+                                                                 const Cancelled& cancelled) {
+    const bool is_near = rough_.has_all_rows();
+    std::vector<double> stages(smoothings.begin(), smoothings.begin() + smoothings_on_noise);
+    if (!is_near) stages.insert(stages.begin(), across_folds_smoothing);
+    RaceResult result;
+    for (std::size_t stage = 0; stage < stages.size(); ++stage) {
+        for (std::size_t f = 0; f < folds_.size(); ++f) {
+            if (cancelled()) return sweep_cancelled();
+            if (stage == 0) start_fold(f, candidate);
+            const double rmse = (*fitted_)[f].rmse_at(stages[stage]);
+            if (stage == 0) {
+                race.set_start(f, rmse);
+            } else {
+                race.set(f, rmse, stages[stage], stage + 1 == stages.size());
+            }
+            if (race.is_lost(terms.bound)) return std::nullopt;
+        }
+        result.mean_mse = race.mean_mse();
+        result.by_stage.push_back(result.mean_mse);
+        const double margin = left_behind(stages[stage], terms.noise_rmse);
+        const bool has_rival = !terms.best_by_stage.empty();
+        if (has_rival && result.mean_mse > margin * margin * terms.best_by_stage[stage]) return std::nullopt;
+    }
     return result;
 }
 
@@ -148,16 +168,12 @@ void SigmaColumn::truncate_at(double tolerance) {
     tolerance_ = tolerance;
 }
 
-/// The first fold from where it was roughly, the others from the first. The error at the first smoothing.
-double SigmaColumn::start_fold(std::size_t f, const SigmaCandidate& candidate) {
+/// From where the fold was roughly; where rows were left out there, the others from the first.
+void SigmaColumn::start_fold(std::size_t f, const SigmaCandidate& candidate) {
     const double C = options_.C_grid[candidate.C_index];
-    HeldOutFold& fold = (*fitted_)[f];
-    if (f == 0) {
-        fold.start(C, rough_.on(fitted_->kernel(), candidate.rough_state));
-        return fold.rmse_at(smoothings.front());
-    }
-    fold.start(C, (*fitted_)[0].solver().state());
-    return fold.rmse_at(across_folds_smoothing);
+    const bool has_own = f == 0 || (rough_.has_all_rows() && f < candidate.rough_states.size());
+    (*fitted_)[f].start(C, has_own ? rough_.on(fitted_->kernel(), candidate.rough_states[f])
+                                   : (*fitted_)[0].solver().state());
 }
 
 }  // namespace thermbal

@@ -23,18 +23,18 @@ struct RaceTerms {
     double bound = 0.0;                     ///< the mean squared error to beat
     const std::vector<double>& least_rmse;  ///< what no error is expected to fall below, fold by fold
     double noise_rmse = 0.0;  ///< of a window of noise: about what no error falls below; 0 elsewhere
-    /// Of the best candidate so far, RaceResult::by_smoothing.
-    std::span<const double> best_by_smoothing{};
+    /// Of the best candidate so far, RaceResult::by_stage.
+    std::span<const double> best_by_stage{};
     /// An error that is small here: what moves predictions by a few hundredths of it does not matter. 0: as
     /// precise as can be.
     double small_rmse = 0.0;
 };
 
-/// Of a candidate that came to the end: the mean squared error over folds, at the last smoothing and after
-/// each.
+/// Of a candidate that came to the end: the mean squared error over folds, at the last smoothing, and
+/// on noise at each.
 struct RaceResult {
     double mean_mse = 0.0;
-    std::vector<double> by_smoothing;
+    std::vector<double> by_stage;
 };
 
 /// Cross-validation of every C at one sigma. The arguments must outlive it; one object a thread.
@@ -55,7 +55,12 @@ class SigmaColumn {
 
   private:
     void truncate_at(double tolerance);
-    double start_fold(std::size_t f, const SigmaCandidate& candidate);
+    class Race;
+    Result<std::optional<RaceResult>> first_fold_ahead(const SigmaCandidate& candidate, Race& race,
+                                                       const RaceTerms& terms, const Cancelled& cancelled);
+    Result<std::optional<RaceResult>> all_folds_abreast(const SigmaCandidate& candidate, Race& race,
+                                                        const RaceTerms& terms, const Cancelled& cancelled);
+    void start_fold(std::size_t f, const SigmaCandidate& candidate);
 
     const LagProblem& problem_;
     double sigma_;
