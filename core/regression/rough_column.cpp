@@ -19,12 +19,42 @@ constexpr double rough_tolerance_factor = 100.0;
 constexpr double rough_truncation_share = 0.3;
 constexpr std::array first_smoothings{0.03, 0.003};
 constexpr double next_folds_smoothing = 0.01;
-/// Up to so much noise, or with so few lags, an error may fall again after it has grown with C (README.md).
-constexpr double weak_noise_in_epsilons = 10.0;
-constexpr std::size_t few_lags = 10;
-int most_lost_in_a_row(double noise_in_epsilons, std::size_t lags) {
-    return noise_in_epsilons > weak_noise_in_epsilons && lags > few_lags ? 1 : 3;
+/// From one C to the next, by as many folds as were fitted at both; 0 if none was.
+struct Growth {
+    double of_squares = 0.0;
+    std::size_t folds = 0;
+};
+Growth growth(const std::vector<double>& from, const std::vector<double>& to) {
+    const std::size_t common = std::min(from.size(), to.size());
+    const auto square_sum = [common](const std::vector<double>& rmse) {
+        return std::inner_product(rmse.begin(), rmse.begin() + static_cast<std::ptrdiff_t>(common),
+                                  rmse.begin(), 0.0);
+    };
+    return {common == 0 ? 0.0 : square_sum(to) / square_sum(from), common};
 }
+
+/// When larger C are left out. Where the noise is weak or the lags are few, an error may fall again after it
+/// has grown; and what a few folds say may not hold for all (README.md).
+class Patience {
+  public:
+    Patience(double noise_in_epsilons, std::size_t lags)
+        : is_short_(noise_in_epsilons > weak_noise_in_epsilons && lags > few_lags) {}
+
+    bool is_over() const { return lost_in_a_row_ >= (is_short_ ? 2 : 3); }
+    void gained() { lost_in_a_row_ = 0; }
+    void lost(const Growth& growth) {
+        const bool is_plain = growth.folds >= 3 && growth.of_squares > plain_growth * plain_growth;
+        lost_in_a_row_ = growth.of_squares > 1.0 ? lost_in_a_row_ + (is_short_ && is_plain ? 2 : 1) : 0;
+    }
+
+  private:
+    static constexpr double weak_noise_in_epsilons = 10.0;
+    static constexpr std::size_t few_lags = 10;
+    static constexpr double plain_growth = 1.01;
+
+    bool is_short_;
+    int lost_in_a_row_ = 0;
+};
 
 /// A tenth of the error to beat, as far as that is known.
 double rough_smoothing(double rmse, double widest) {
@@ -41,16 +71,6 @@ RoughFit fit_roughly(HeldOutFold& fold, double last_smoothing) {
     if (first_smoothings[1] > last_smoothing) static_cast<void>(fold.rmse_at(first_smoothings[1]));
     const double rmse = fold.rmse_at(last_smoothing);
     return {rmse, lowest_rmse(rmse, before, last_smoothing)};
-}
-
-/// By as many folds as both have.
-bool is_above(const std::vector<double>& a, const std::vector<double>& b) {
-    const std::size_t common = std::min(a.size(), b.size());
-    const auto square_sum = [common](const std::vector<double>& rmse) {
-        return std::inner_product(rmse.begin(), rmse.begin() + static_cast<std::ptrdiff_t>(common),
-                                  rmse.begin(), 0.0);
-    };
-    return square_sum(a) > square_sum(b);
 }
 
 TubeSolver::State padded(TubeSolver::State state, Index rank) {
@@ -121,10 +141,9 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
     SigmaCandidate fit;
     fit.sigma_index = sigma_index_;
     RoughRanking ranking{.candidates = {}, .least_mean_mse = std::numeric_limits<double>::infinity()};
-    const int most_lost = most_lost_in_a_row(noise_rmse / options_.epsilon, problem_.lags);
-    int lost_in_a_row = 0;
+    Patience patience(noise_rmse / options_.epsilon, problem_.lags);
     std::vector<double> before;
-    for (std::size_t k = 0; k < options_.C_grid.size() && lost_in_a_row < most_lost; ++k) {
+    for (std::size_t k = 0; k < options_.C_grid.size() && !patience.is_over(); ++k) {
         if (cancelled()) return sweep_cancelled();
         const double needed = truncation(rough_truncation_share, noise_rmse, largest_sum, finest);
         if (needed < tolerance) {
@@ -136,9 +155,12 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
         const double limit_mse = margin() * margin() * least_mse;
         fit.C_index = k;
         std::vector<double> fold_rmse = fit_all_folds(fit, smoothing, limit_mse);
-        const bool lost = fit.rough_mean_mse > limit_mse;
-        if (!lost) ranking.candidates.push_back(fit);
-        lost_in_a_row = lost && is_above(fold_rmse, before) ? lost_in_a_row + 1 : 0;
+        if (fit.rough_mean_mse > limit_mse) {
+            patience.lost(growth(before, fold_rmse));
+        } else {
+            patience.gained();
+            ranking.candidates.push_back(fit);
+        }
         before = std::move(fold_rmse);
         ranking.least_mean_mse = std::min(ranking.least_mean_mse, fit.rough_mean_mse);
         least_mse = std::min(least_mse, fit.rough_mean_mse);

@@ -46,9 +46,8 @@ class RoughColumn {
                                                            const Cancelled& cancelled);
 
     /// All folds, from the smallest C up, for windows of noise: `noise_rmse` is about what no error falls
-    /// below. Whose mean is beyond the margin from `least_mse` is no candidate; after three such in a
-    /// row (one, where the noise is strong and the lags are many), the error growing, larger C are left out.
-    /// Error: stop when cancelled.
+    /// below. Whose mean is beyond the margin from `least_mse` is no candidate; after one to three such in a
+    /// row, the error growing, larger C are left out. Error: stop when cancelled.
     Result<RoughRanking> rank_by_all_folds(double noise_rmse, double least_mse, const Cancelled& cancelled);
 
     bool has_all_rows() const { return stride_ == 1; }

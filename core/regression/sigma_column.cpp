@@ -133,7 +133,9 @@ Result<std::optional<RaceResult>> SigmaColumn::all_folds_abreast(const SigmaCand
         for (std::size_t f = 0; f < folds_.size(); ++f) {
             if (cancelled()) return sweep_cancelled();
             if (stage == 0) start_fold(f, candidate);
-            const double rmse = (*fitted_)[f].rmse_at(stages[stage]);
+            // Fold 0 leads: the others start from it.
+            const double rmse =
+                (*fitted_)[f].rmse_at(f == 0 ? std::min(stages[stage], smoothings.front()) : stages[stage]);
             if (stage == 0) {
                 race.set_start(f, rmse);
             } else {
