@@ -71,9 +71,9 @@ TEST(Panels, CholeskySolvesWhatEigenSolves) {
 
 /// One system for changing rows, few and many, so that what it keeps is brought up to date, made anew, and
 /// used in both spaces: every direction must solve the equations of the header.
-TEST(NewtonSystem, DirectionsSolveTheEquationsWhateverRowsCameBefore) {
+void expect_directions_of(const Index all_rows) {
     const Index rank = 16;
-    const MatrixXd by_row = MatrixXd::Random(rank, 60);
+    const MatrixXd by_row = MatrixXd::Random(rank, all_rows);
     const VectorXd gradient = VectorXd::Random(rank);
     NewtonSystem system(by_row);
     const auto every = [](Index first, Index step, Index end) {
@@ -99,6 +99,15 @@ TEST(NewtonSystem, DirectionsSolveTheEquationsWhateverRowsCameBefore) {
                         1e-13 * curvature * (1.0 + direction.weights.norm() * X.norm()) + 1e-12);
         }
     }
+}
+
+TEST(NewtonSystem, DirectionsSolveTheEquationsWhateverRowsCameBefore) {
+    expect_directions_of(60);
+}
+
+/// So many that the products of all rows with one another are not kept.
+TEST(NewtonSystem, DirectionsSolveTheEquationsAmongManyRows) {
+    expect_directions_of(900);
 }
 
 }  // namespace
