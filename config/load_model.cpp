@@ -143,6 +143,7 @@ class ModelLoader {
         sensor.channel = required_text(reader, "channel", "T1, T2, ...");
         sensor.node = required_text(reader, "node", "the name of a [[node]], or \"ambient\"");
         set(sensor.noise_C, reader.number("noise_C", {1e-6, 100.0}));
+        set(sensor.place_share, reader.number("place_share", any_number));
         model_.sensors.push_back(std::move(sensor));
     }
 

@@ -98,6 +98,7 @@ std::string write_model(const Model& model, std::string_view comment) {
     for (const Sensor& sensor : model.sensors) {
         text += fmt::format("\n[[sensor]]\nchannel = {}\nnode = {}\nnoise_C = {}\n",
                             toml_quoted(sensor.channel), toml_quoted(sensor.node), number(sensor.noise_C));
+        if (sensor.place_share != 0.0) text += fmt::format("place_share = {}\n", number(sensor.place_share));
     }
     for (const Effect& effect : model.effects) text += write_effect(effect);
     return text;

@@ -129,6 +129,7 @@ Result<std::vector<FoundEffect>> describe_effects(const Evidence& evidence, cons
         one.effect.provenance = {options.found_on, one.probability, ""};
         for (std::size_t p = 0; p < one.effect.parameters.size() && p < one.parameters.size(); ++p) {
             one.effect.parameters[p].sigma = one.parameters[p].sigma;
+            if (one.parameters[p].at_bound) one.parameters[p].value = one.effect.parameters[p].value;
         }
         one.experiments = experiments_against(evidence, search, k, one.alternatives);
         one.rmse_before_C = root_mean_square(before.fit.point.difference_C);

@@ -10,6 +10,7 @@
 #include "disagreement.hpp"
 #include "fidelity.hpp"
 #include "search.hpp"
+#include "size_at_bound.hpp"
 #include "spread.hpp"
 #include "thermostats.hpp"
 
@@ -110,26 +111,38 @@ Result<SearchResult> search_at_fidelity_seen(Evidence& evidence, const DiagnoseO
     }
 }
 
-/// The models that a file can hold: a sensor has no place of its own in its node there, so that the model's
-/// own numbers have to describe what that place did in the search.
+/// The models that a file can hold: a sensor has its place in the node there, but no gradient.
 struct WrittenModels {
     Model calibrated, extended;
 };
 
+Model with_places(const Explanation& explanation, const FitData& data) {
+    Model model = explanation.fit.model;
+    const auto nuisances = explanation.fit.point.coordinates.tail(data.nuisances());
+    for (std::size_t c = 0; c < data.seen.columns(); ++c) {
+        double& place_share = model.sensors[data.seen.sensors[c]].place_share;
+        const double more = nuisances(static_cast<Eigen::Index>(data.starts.size() + c));
+        place_share = (1.0 + place_share) * (1.0 + more) - 1.0;
+    }
+    return model;
+}
+
 Result<WrittenModels> as_written(const Evidence& evidence, const SearchResult& search) {
-    Evidence without_places = evidence;
-    without_places.run.place_sigma = 1e-6;
+    Evidence without_gradients = evidence;
+    without_gradients.run.gradient_sigma = 1e-6;
     // A search has to be careful with what it calls a disagreement; numbers are the better the nearer the
     // wander is to what is seen.
-    allow_for(without_places,
+    allow_for(without_gradients,
               share_of_rise_seen(evidence.run, search.current.fit.point, evidence.calibration.fidelity));
-    take_for_spread(without_places, spread_seen(evidence, search.current.fit));
-    auto calibrated = polish(without_places, search.base);
+    take_for_spread(without_gradients, spread_seen(evidence, search.current.fit));
+    auto calibrated = polish(without_gradients, search.base);
     if (!calibrated) return std::unexpected(calibrated.error());
-    if (search.steps.empty()) return WrittenModels{calibrated->fit.model, calibrated->fit.model};
-    auto extended = polish_thermostats(without_places, search.current);
+    const Model before = with_places(*calibrated, without_gradients.run);
+    if (search.steps.empty()) return WrittenModels{before, before};
+    auto extended = polish_thermostats(without_gradients, search.current);
+    if (extended) extended = with_expected_sizes(without_gradients, *extended);
     if (!extended) return std::unexpected(extended.error());
-    return WrittenModels{std::move(calibrated->fit.model), std::move(extended->fit.model)};
+    return WrittenModels{before, with_places(*extended, without_gradients.run)};
 }
 
 /// With the effects as they were described: provenance, how well each number is known.

@@ -10,8 +10,8 @@
 namespace thermbal {
 namespace {
 
-constexpr std::array shares_tried = {0.001, 0.002, 0.003, 0.0045, 0.007, 0.01,
-                                     0.015, 0.023, 0.035, 0.05,   0.08};
+constexpr std::array shares_tried = {0.0001, 0.0002, 0.0003, 0.00045, 0.0007, 0.001, 0.0015, 0.002, 0.003,
+                                     0.0045, 0.007,  0.01,   0.015,   0.023,  0.035, 0.05,   0.08};
 
 }  // namespace
 

@@ -25,13 +25,14 @@ struct FitData {
         double sigma_C;
     };
     std::vector<Start> starts;
-    double place_sigma = 0.0;  ///< ModelFidelity::place_share
+    double place_sigma = 0.0;     ///< ModelFidelity::place_share
+    double gradient_sigma = 0.0;  ///< the same, of what a gradient may be over its column's range
     /// A node that is heated is warmer where the heat enters, as long as it does: a sensor on it reads a
     /// little more or less than the node's mean, in proportion to the heat.
     struct Gradient {
         Eigen::Index column;
         Eigen::VectorXd drive;  ///< rows: heat of the node's sources over their heat at the references
-        double range_C;         ///< of the column: place_sigma of it is what the gradient may be
+        double range_C;         ///< of the column: gradient_sigma of it is what the gradient may be
     };
     std::vector<Gradient> gradients;
 

@@ -77,7 +77,7 @@ Result<FitData> make_fit_data(const Model& model, const RecordedTest& test,
                               const CalibrationOptions& options) {
     auto seen = observe(model, test, bin_width_s(test, options.bin_s));
     if (!seen) return std::unexpected(seen.error());
-    FitData data{std::move(*seen), {}, {}, options.fidelity.place_share, {}};
+    FitData data{std::move(*seen), {}, {}, options.fidelity.place_share, options.fidelity.place_share, {}};
     data.whitening = Whitening(data.seen, options.fidelity);
     data.starts = starts_of(model, data.seen);
     data.gradients = gradients_of(model, data.seen);
@@ -216,7 +216,7 @@ double FitProblem::nuisance_sigma(Eigen::Index nuisance) const {
     const std::size_t before_gradients = data_->starts.size() + data_->seen.columns();
     if (k < data_->starts.size()) return data_->starts[k].sigma_C;
     if (k < before_gradients) return data_->place_sigma;
-    return data_->place_sigma * std::max(data_->gradients[k - before_gradients].range_C, 1e-3);
+    return data_->gradient_sigma * std::max(data_->gradients[k - before_gradients].range_C, 1e-3);
 }
 
 double FitProblem::flat_sigma(const Parameter& parameter) const {

@@ -19,6 +19,11 @@ class Linearisation {
     struct Gain {
         double amplitude = 0.0;  ///< best multiple of the change
         double log_likelihood = 0.0;
+        /// Of another amplitude: what is gained falls with the square of how far that is from the best.
+        Gain at(double other) const {
+            const double share = other / amplitude;
+            return {other, log_likelihood * share * (2.0 - share)};
+        }
     };
     /// Of adding `amplitude * change`, with every parameter free to follow.
     Gain gain_of(const Eigen::VectorXd& whitened_change) const;

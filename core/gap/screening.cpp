@@ -67,8 +67,6 @@ std::vector<Effect> with_phases(const std::vector<Effect>& shapes) {
     return result;
 }
 
-/// A size that is a length of time changes the effect's shape: a stop of a minute is not a tenth of one of
-/// ten.
 bool is_a_stop(const Candidate& candidate) {
     return candidate.form->parameters.front().name == "duration_s";
 }
@@ -103,14 +101,27 @@ std::vector<Effect> shapes_of(const Candidate& candidate, const Model& model, co
 struct SizeProbe {
     bool relative = false;  ///< the size is a multiple of the probe; else the probe's logarithm is
     double value = 0.0;
+    std::optional<double> reach;  ///< the factor by which the size may be off it; absent: any
 };
 
 SizeProbe probe_of(const ResolvedPrior& prior) {
-    if (!prior.logarithmic) return {true, std::min(prior.sigma, prior.upper)};
+    if (!prior.logarithmic) return {true, std::min(prior.sigma, prior.upper), {}};
     if (prior.lower < 1.0 && prior.upper > 1.0 && std::abs(prior.centre - 1.0) < 1e-9) {
-        return {false, std::exp(0.5 * prior.sigma)};  // a factor that does nothing at 1
+        return {false, std::exp(0.5 * prior.sigma), {}};  // a factor that does nothing at 1
     }
-    return {true, prior.centre};
+    return {true, prior.centre, {}};
+}
+
+/// Where a size that changes the effect's shape is probed: a stop of a minute is no tenth of one of ten, and
+/// a small mass soon follows its node where a large one takes heat all the time.
+std::vector<SizeProbe> probes_of(const Candidate& candidate, const ResolvedPrior& prior, double bin_s) {
+    std::vector<SizeProbe> probes = {probe_of(prior)};
+    if (is_a_stop(candidate)) probes.push_back({true, std::max(0.1 * prior.centre, bin_s), {}});
+    if (candidate.form->parameters.front().name != "heat_capacity_J_per_K") return probes;
+    probes.clear();
+    for (const double sigmas : {-2.0, -1.0, 0.0, 1.0})
+        probes.push_back({true, prior.centre * std::exp(sigmas * prior.sigma), std::exp(0.5 * prior.sigma)});
+    return probes;
 }
 
 double size_of(const SizeProbe& probe, double amplitude, const ResolvedPrior& prior) {
@@ -152,9 +163,10 @@ class BestShape {
         shape.parameters.front().value = probe.value;
         const auto change = change_by(shape);
         if (!change) return;
-        const auto gain = ground_->linearisation().gain_of(*change);
+        auto gain = ground_->linearisation().gain_of(*change);
         const bool one_sided = probe.relative && prior_.lower >= 0.0;
         if (one_sided && gain.amplitude <= 0.0) return;
+        if (probe.reach) gain = gain.at(std::clamp(gain.amplitude, 1.0 / *probe.reach, *probe.reach));
         if (gain.log_likelihood <= best_.log_likelihood_gain) return;
         best_.log_likelihood_gain = gain.log_likelihood;
         best_.start = std::move(shape);
@@ -210,9 +222,7 @@ std::vector<double> drive_changes_s(const Model& model, const Inputs& inputs) {
 Screened screen(const Candidate& candidate, const ScreeningGround& ground, const ResidualTiming& timing) {
     const Observation& seen = ground.run();
     BestShape best(candidate, ground);
-    std::vector<SizeProbe> probes = {probe_of(best.prior())};
-    if (is_a_stop(candidate)) probes.push_back({true, std::max(0.1 * best.prior().centre, seen.bin_s)});
-    for (const SizeProbe& probe : probes) {
+    for (const SizeProbe& probe : probes_of(candidate, best.prior(), seen.bin_s)) {
         for (Effect& shape : shapes_of(candidate, ground.model(), seen, timing))
             best.look_at(std::move(shape), probe);
     }

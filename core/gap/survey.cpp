@@ -99,11 +99,24 @@ bool sets_in_on_its_own(const Evidence& evidence, const Contender& contender) {
         changes_s, [&](double change_s) { return std::abs(*onset_s - change_s) < bins * seen.bin_s; });
 }
 
+/// What the catalogue believes of an effect's numbers says nothing of the run.
+double chi2_without_prior_of_last_effect(const Fit& fit) {
+    const Eigen::Index samples = fit.point.simulated_C.size();
+    double chi2 = fit.point.chi2;
+    for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
+        if (!fit.parameters[i].of_effect || fit.parameters[i].effect + 1 < fit.model.effects.size()) continue;
+        const double prior = fit.point.residual(samples + static_cast<Eigen::Index>(i));
+        chi2 -= prior * prior;
+    }
+    return chi2;
+}
+
 /// What describes the run itself worse than nothing does is there to please the held-out runs: a misfit of
 /// theirs dressed up.
 bool describes_the_run(const Contender& contender, const Explanation& current) {
     constexpr double most_nats_lost = 2.0;
-    return 0.5 * (contender.explanation.fit.point.chi2 - current.fit.point.chi2) < most_nats_lost;
+    const double chi2 = chi2_without_prior_of_last_effect(contender.explanation.fit);
+    return 0.5 * (chi2 - current.fit.point.chi2) < most_nats_lost;
 }
 
 std::vector<Contender> fitted(const Evidence& evidence, const Explanation& current,

@@ -14,6 +14,8 @@ namespace {
 
 using Table = ModelPlace::Table;
 
+constexpr double most_place_share = 0.5;
+
 class Checker {
   public:
     explicit Checker(const Model& model) : model_(model) {}
@@ -152,6 +154,11 @@ class Checker {
         if (!(sensor.noise_C > 0.0) || !std::isfinite(sensor.noise_C)) {
             complain(Table::sensor, i, "noise_C",
                      fmt::format("found {}; accepted: a positive number", sensor.noise_C));
+        }
+        if (!(std::abs(sensor.place_share) <= most_place_share)) {
+            complain(Table::sensor, i, "place_share",
+                     fmt::format("found {}; accepted: {} to {}", sensor.place_share, -most_place_share,
+                                 most_place_share));
         }
     }
 

@@ -48,6 +48,13 @@ Result<CompiledNetwork> compile(const Model& model, InputSchedule& schedule) {
     return std::move(builder).finish();
 }
 
+/// What a sensor reads more than its node's mean because of where it sits in the node.
+double of_place(const Sensor& sensor, const CompiledSensor& compiled, double reading_C,
+                const Eigen::VectorXd& initial_C) {
+    if (compiled.node == ambient_index) return 0.0;
+    return sensor.place_share * (reading_C - initial_C[static_cast<Index>(compiled.node)]);
+}
+
 double first_ambient(const CompiledNetwork& network, InputSchedule& schedule) {
     HeatFlow heat(network, schedule);
     heat.begin_step(schedule.start_s(), schedule.start_s());
@@ -79,8 +86,9 @@ Result<Simulation> simulate(const Model& model, const Inputs& inputs, std::span<
         simulation.node_C.row(row) = node_C;
         simulation.ambient_C[row] = ambient_C;
         for (std::size_t i = 0; i < model.sensors.size(); ++i) {
+            const double reading_C = sensors.read(i, sample_times_s[sample], node_C, ambient_C);
             simulation.reading_C(row, static_cast<Index>(i)) =
-                sensors.read(i, sample_times_s[sample], node_C, ambient_C);
+                reading_C + of_place(model.sensors[i], network->sensors[i], reading_C, initial_C);
         }
     };
     if (auto done = integrator.run(initial_C, sample_times_s, record); !done)

@@ -111,6 +111,32 @@ TEST(Diagnose, AChillerDoesNotHideASensorThatDrifts) {
     EXPECT_LT(diagnosis->run.after_rmse_C, 0.1);
 }
 
+/// 3 kJ/K where the model's own masses are 3 to 40.
+TEST(Diagnose, FindsASmallMassBehindANode) {
+    const auto diagnosis =
+        diagnosis_of(with("slow_structure", "housing",
+                          {{"heat_capacity_J_per_K", 3000.0, 0.0}, {"conductance_W_per_K", 3.0, 0.0}}));
+    ASSERT_TRUE(diagnosis.has_value()) << diagnosis.error().message;
+    ASSERT_EQ(diagnosis->effects.size(), 1u) << diagnosis->reason;
+    const FoundEffect& found = diagnosis->effects.front();
+    EXPECT_EQ(found.effect.kind, "slow_structure");
+    EXPECT_EQ(found.at, "housing");
+    EXPECT_NEAR(found.effect.parameter("heat_capacity_J_per_K"), 3000.0, 600.0);
+}
+
+TEST(Diagnose, WritesWhereASensorSitsInItsNode) {
+    Model truth = small_machine();
+    truth.sensors[1].place_share = 0.015;
+    truth.sensors.push_back({"T4", "housing", 0.05, -0.015});
+    Model model = small_machine();
+    model.sensors.push_back({"T4", "housing", 0.05, 0.0});
+    const auto diagnosis = diagnose(model, measured_on(truth, 300.0, 0.05, 7), {}, {}, sequential_for);
+    ASSERT_TRUE(diagnosis.has_value()) << diagnosis.error().message;
+    const auto& sensors = diagnosis->calibrated.sensors;
+    EXPECT_NEAR(sensors[1].place_share - sensors[3].place_share, 0.03, 0.004);
+    EXPECT_LT(diagnosis->run.before_rmse_C, 0.052);
+}
+
 TEST(Diagnose, TheExtendedModelIsAModelAgain) {
     const auto diagnosis =
         diagnosis_of(with("cutting_heat", "bed", {{"power_W", 60.0, 0.0}, {"onset_s", 6000.0, 0.0}}));

@@ -18,6 +18,23 @@ TEST(NetworkAnalytic, OneMassWarmsAsOneExponential) {
     }
 }
 
+TEST(NetworkAnalytic, ASensorInAWarmPlaceRisesMoreThanItsNode) {
+    Model model = one_node(5000.0, 4.0, 80.0);
+    model.sensors[0].place_share = 0.05;
+    Inputs inputs;
+    inputs.time_s = {0.0};
+    inputs.first_readings = {{"T2", 23.0}};
+    const auto times = every(60.0, 7200.0);
+    const auto simulation = simulate(model, inputs, times);
+    ASSERT_TRUE(simulation) << simulation.error().message;
+    for (std::size_t k = 0; k < times.size(); ++k) {
+        const double rise_C = 17.0 * (1.0 - std::exp(-times[k] * 4.0 / 5000.0));
+        const auto row = static_cast<Eigen::Index>(k);
+        EXPECT_NEAR(simulation->node_C(row, 0), 23.0 + rise_C, 1e-10);
+        EXPECT_NEAR(simulation->reading_C(row, 0), 23.0 + 1.05 * rise_C, 1e-10);
+    }
+}
+
 TEST(NetworkAnalytic, TwoMassesDecayAsTheirTwoModes) {
     // Equal masses and losses: the sum decays with g / C, the difference with (g + 2 k) / C.
     Model model = one_node(3000.0, 2.0, 0.0);

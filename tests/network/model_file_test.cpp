@@ -100,6 +100,8 @@ TEST(ModelFile, SaysEveryMistakeWithLineAndColumn) {
                 HasSubstr("m.toml:12:1: link.conductance"));
     EXPECT_THAT(refusal(with("noise_C = 0.06", "noise_C = \"low\"")),
                 StartsWith("m.toml:23:11: sensor.noise_C"));
+    EXPECT_THAT(refusal(std::string(good) + "place_share = 0.7\n"),
+                StartsWith("m.toml:24:15: sensor.place_share: found 0.7"));
     EXPECT_THAT(refusal(with("reference = 5000.0\n", "")),
                 StartsWith("m.toml:14:1: source.reference: is missing"));
     EXPECT_THAT(refusal(with("[model]", "[modle]")), HasSubstr("did you mean model?"));
@@ -118,6 +120,7 @@ TEST(ModelFile, WhatIsWrittenReadsBackToTheSame) {
     model.ambient = {"", 19.3, 0.25};
     model.nodes[2].heat_capacity_J_per_K = {1.0 / 3.0, 0.123456789};
     model.sources[0].exponent = {1.3, 0.2};
+    model.sensors[1].place_share = -0.0123;
     model.effects = {
         {"coolant_cycling",
          "thermostat",
@@ -134,6 +137,8 @@ TEST(ModelFile, WhatIsWrittenReadsBackToTheSame) {
     EXPECT_EQ(write_model(*back, "calibrated\non x.csv"), text);
     EXPECT_EQ(back->nodes[2].heat_capacity_J_per_K.value, 1.0 / 3.0);
     EXPECT_EQ(back->ambient.sigma_C, 0.25);
+    EXPECT_EQ(back->sensors[1].place_share, -0.0123);
+    EXPECT_EQ(back->sensors[2].place_share, 0.0);
     EXPECT_EQ(back->effects[0].parameters[0].sigma, 12.0);
     EXPECT_EQ(back->effects[0].provenance.probability, 0.97);
     EXPECT_EQ(back->effects[1].at, "motor");

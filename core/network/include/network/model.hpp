@@ -58,6 +58,8 @@ struct Sensor {
     std::string channel;
     std::string node;  ///< may be the ambient
     double noise_C = 0.05;
+    /// Where it sits in its node: it rises by this share more than the node does.
+    double place_share = 0.0;
 };
 
 struct EffectParameter {

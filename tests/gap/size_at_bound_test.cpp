@@ -1,0 +1,73 @@
+#include "size_at_bound.hpp"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "small_machine.hpp"
+
+namespace thermbal {
+namespace {
+
+double mean_of_draws_above(double bound, double mean, double sigma) {
+    std::mt19937 random(1);
+    std::normal_distribution<double> draw(mean, sigma);
+    double sum = 0.0;
+    for (int kept = 0; kept < 20000;) {
+        const double one = draw(random);
+        if (one < bound) continue;
+        sum += one;
+        ++kept;
+    }
+    return sum / 20000;
+}
+
+TEST(MeanAbove, IsTheMeanOfTheDrawsThatAreLeft) {
+    for (const double mean : {-2.0, -0.5, 0.0, 1.0, 4.0})
+        EXPECT_NEAR(mean_above(0.0, mean, 1.0), mean_of_draws_above(0.0, mean, 1.0), 0.025) << mean;
+    EXPECT_NEAR(mean_above(3.0, 3.0, 2.0), mean_of_draws_above(3.0, 3.0, 2.0), 0.05);
+}
+
+TEST(MeanAbove, GoesOnFarBeyondTheBound) {
+    EXPECT_NEAR(mean_above(0.0, -7.999, 1.0), mean_above(0.0, -8.001, 1.0), 0.001);
+    EXPECT_GT(mean_above(0.0, -1e6, 1.0), 0.0);
+}
+
+/// Friction that falls as it warms is the opposite of friction that grows: a fit of that stops at none.
+TEST(ExpectedSize, IsMoreThanNoneWhereTheFitStoppedAtNone) {
+    Model truth = small_machine();
+    truth.effects.push_back({"friction_viscosity", "", "bearing", {{"beta_per_K", 0.01, 0.0}}, {}});
+    const CalibrationOptions options;
+    Evidence evidence;
+    evidence.prior_model = small_machine();
+    evidence.run = make_fit_data(small_machine(), measured_on(truth, 300.0, 0.05, 3), options).value();
+    evidence.parallel_for = sequential_for;
+    const auto fitted =
+        explain(evidence, {{"preload_growth", "", "bearing", {{"growth_per_K", 0.03, 0.0}}, {}}}, nullptr);
+    ASSERT_TRUE(fitted.has_value());
+    ASSERT_EQ(fitted->fit.model.effects[0].parameter("growth_per_K"), 0.0);
+    const auto expected = with_expected_sizes(evidence, *fitted);
+    ASSERT_TRUE(expected.has_value());
+    EXPECT_GT(expected->fit.model.effects[0].parameter("growth_per_K"), 0.0);
+    EXPECT_LT(expected->fit.point.chi2, fitted->fit.point.chi2 + 6.0);
+}
+
+TEST(ExpectedSize, IsTheFittedOneElsewhere) {
+    Model truth = small_machine();
+    truth.effects.push_back({"preload_growth", "", "bearing", {{"growth_per_K", 0.05, 0.0}}, {}});
+    Evidence evidence;
+    evidence.prior_model = small_machine();
+    evidence.run = make_fit_data(small_machine(), measured_on(truth, 300.0, 0.05, 3), {}).value();
+    evidence.parallel_for = sequential_for;
+    const auto fitted =
+        explain(evidence, {{"preload_growth", "", "bearing", {{"growth_per_K", 0.03, 0.0}}, {}}}, nullptr);
+    ASSERT_TRUE(fitted.has_value());
+    const auto expected = with_expected_sizes(evidence, *fitted);
+    ASSERT_TRUE(expected.has_value());
+    EXPECT_EQ(expected->fit.model.effects[0].parameter("growth_per_K"),
+              fitted->fit.model.effects[0].parameter("growth_per_K"));
+}
+
+}  // namespace
+}  // namespace thermbal
