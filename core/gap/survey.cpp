@@ -99,6 +99,16 @@ bool sets_in_on_its_own(const Evidence& evidence, const Contender& contender) {
         changes_s, [&](double change_s) { return std::abs(*onset_s - change_s) < bins * seen.bin_s; });
 }
 
+/// A mass that follows its node within two bins is the node's own heat capacity, of which the model has a
+/// number already.
+bool is_of_its_own(const Evidence& evidence, const Contender& contender) {
+    constexpr double bins = 2.0;
+    const Effect& effect = contender.explanation.fit.model.effects.back();
+    const double follows_within_s =
+        effect.parameter("heat_capacity_J_per_K") / effect.parameter("conductance_W_per_K");
+    return !(follows_within_s < bins * evidence.run.seen.bin_s);  // NaN: no mass
+}
+
 /// What the catalogue believes of an effect's numbers says nothing of the run.
 double chi2_without_prior_of_last_effect(const Fit& fit) {
     const Eigen::Index samples = fit.point.simulated_C.size();
@@ -131,7 +141,8 @@ std::vector<Contender> fitted(const Evidence& evidence, const Explanation& curre
         if (explanations[i]) contenders.push_back({chosen[i].candidate, std::move(*explanations[i]), 0.0});
     }
     std::erase_if(contenders, [&](const Contender& one) {
-        return !sets_in_on_its_own(evidence, one) || !describes_the_run(one, current);
+        return !sets_in_on_its_own(evidence, one) || !is_of_its_own(evidence, one) ||
+               !describes_the_run(one, current);
     });
     return contenders;
 }
