@@ -18,10 +18,15 @@ ChannelVerdict verdict(ChannelState state, double at_min, double low_C, double h
     return made;
 }
 
+ChannelVerdict in_a_room(double room_C, ChannelVerdict verdict) {
+    verdict.room_C = room_C;
+    return verdict;
+}
+
 /// 26.6 to 26.9 C.
-Declarations declared_at_62() {
+Declarations declared_at_62(double room_C = no_value) {
     Declarations declarations;
-    declarations.update({verdict(ChannelState::declared, 62, 26.6, 26.9)}, 0);
+    declarations.update({in_a_room(room_C, verdict(ChannelState::declared, 62, 26.6, 26.9))}, 0);
     return declarations;
 }
 
@@ -90,27 +95,17 @@ TEST(Declarations, NothingIsRenewedForLittleOrForWhatIsItselfNotKnown) {
 }
 
 TEST(Declarations, ARoomThatHasMovedIsNoFaultOfADeclaration) {
-    Declarations declarations;
-    auto first = verdict(ChannelState::declared, 62, 26.6, 26.9);
-    first.room_C = 21.0;
-    declarations.update({first}, 0);
-    auto later = verdict(ChannelState::declared, 80, 26.88, 27.08);
-    later.room_C = 21.15;
-    EXPECT_TRUE(declarations.update({later}, 0).empty());
-    later.room_C = 21.0;
-    EXPECT_EQ(declarations.update({later}, 0).size(), 1U);
+    Declarations declarations = declared_at_62(21.0);
+    const auto later = verdict(ChannelState::declared, 80, 26.88, 27.08);
+    EXPECT_TRUE(declarations.update({in_a_room(21.15, later)}, 0).empty());
+    EXPECT_EQ(declarations.update({in_a_room(21.0, later)}, 0)[0].kind, DeclarationChange::Kind::renewed);
 }
 
 TEST(Declarations, WhatIsApartOnlyByTheRoomStands) {
-    Declarations declarations;
-    auto first = verdict(ChannelState::declared, 62, 26.6, 26.9);
-    first.room_C = 21.0;
-    declarations.update({first}, 0);
-    auto later = verdict(ChannelState::measuring, 80, 27.0, 27.8);
-    later.room_C = 21.6;
-    EXPECT_TRUE(declarations.update({later}, 0).empty());
-    later.room_C = 21.0;
-    EXPECT_EQ(declarations.update({later}, 0)[0].kind, DeclarationChange::Kind::withdrawn);
+    Declarations declarations = declared_at_62(21.0);
+    const auto later = verdict(ChannelState::measuring, 80, 27.0, 27.8);
+    EXPECT_TRUE(declarations.update({in_a_room(21.6, later)}, 0).empty());
+    EXPECT_EQ(declarations.update({in_a_room(21.0, later)}, 0)[0].kind, DeclarationChange::Kind::withdrawn);
 }
 
 TEST(Declarations, WhatATestWasStoppedOnIsNotRenewed) {
