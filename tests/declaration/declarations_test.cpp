@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "series/sample.hpp"
+
 namespace thermbal {
 namespace {
 
