@@ -13,8 +13,7 @@ namespace {
 constexpr double much_worse = 1.05;
 
 /// Nats of a run's own readings below which it is as good as before; of the held-out runs, where numbers that
-/// the run did not tell say more. What 20 and 40 asked of both let pass as many false names again
-/// (README.md).
+/// the run did not tell say more. With 20 and 40 twice as many effect-free runs have a name (README.md).
 constexpr double least_of_the_run = 60.0, least_of_holdouts = 100.0;
 
 double log_likelihood_gained(const RunComparison& run) {

@@ -39,9 +39,10 @@ Result<Explanation> with_expected_sizes(const Evidence& evidence, const Explanat
         if (!stopped_at_lower_bound(parameter, at) || parameter.effect < known) continue;
         const double variance = hessian.solve(Eigen::VectorXd::Unit(slope.size(), k))(k);
         const double size = mean_above(parameter.lower, at - variance * slope(k), std::sqrt(variance));
-        const std::string name = parameter.name.substr(parameter.name.rfind('.') + 1);
         for (EffectParameter& number : expected.effects[parameter.effect - known].parameters) {
-            if (number.name == name) number = {name, size, as_good_as_fixed * (size - parameter.lower)};
+            if (number.name != parameter.short_name()) continue;
+            number.value = size;
+            number.sigma = as_good_as_fixed * (size - parameter.lower);
         }
         expected.fit.point.coordinates(k) = size;
         moved = true;

@@ -55,10 +55,11 @@ void split_off_the_room(const SpectrumProblem& problem, const Eigen::VectorXd& o
                         const Eigen::RowVectorXd& now, ChannelEstimate& channel) {
     if (!problem.basis.has_ambient) return;
     const Eigen::Index lags = problem.basis.grid();
-    const Eigen::VectorXd answer = of_basis.segment(1 + lags, lags);
-    const double in_all_C = problem.functional.segment(1 + lags, lags).dot(answer);
-    channel.room_rise_C = in_all_C + problem.room_before_C * answer.sum();
-    channel.room_to_come_C = in_all_C - now.segment(1 + lags, lags).dot(answer);
+    const Eigen::VectorXd answer = of_basis.tail(lags);
+    const double gain = answer.sum();
+    const double moved_C = problem.room.tail_C - problem.room.reference_C;
+    channel.room_rise_C = gain * (problem.room_before_C + moved_C);
+    channel.room_to_come_C = gain * moved_C - now.tail(lags).dot(answer);
 }
 
 /// How a posterior becomes an interval, see SpectrumOptions.

@@ -168,11 +168,9 @@ Result<std::vector<ObservedChannel>> observed_channels(const SpectrumProblem& pr
 double room_moved_before(const SpectrumProblem& problem, std::string_view ambient,
                          const std::vector<double>& start_level_C) {
     if (!problem.room.measured || start_level_C.empty()) return 0.0;
-    for (std::size_t i = 0; i < problem.window.channels.size(); ++i) {
-        if (problem.window.channels[i].name != ambient || !std::isfinite(start_level_C[i])) continue;
-        return problem.room.reference_C - start_level_C[i];
-    }
-    return 0.0;
+    const auto room = std::ranges::find(problem.window.channels, ambient, &Column::name);
+    const double start_C = start_level_C[static_cast<std::size_t>(room - problem.window.channels.begin())];
+    return std::isfinite(start_C) ? problem.room.reference_C - start_C : 0.0;
 }
 
 /// A sensor far from the heat is flat at first because its modes cancel, not because they are small: no

@@ -19,6 +19,7 @@ constexpr double rough_tolerance_factor = 100.0;
 constexpr double rough_truncation_share = 0.3;
 constexpr std::array first_smoothings{0.03, 0.003};
 constexpr double next_folds_smoothing = 0.01;
+
 /// From one C to the next, by as many folds as were fitted at both; 0 if none was.
 struct Growth {
     double of_squares = 0.0;

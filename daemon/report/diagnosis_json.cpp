@@ -17,11 +17,6 @@ std::pair<double, double> interval_of(const CalibratedParameter& number) {
             number.parameter.to_value(at + z90 * number.sigma)};
 }
 
-/// "coolant_cycling(sleeve).power_W" -> "power_W"
-std::string short_name(const std::string& name) {
-    return name.substr(name.rfind('.') + 1);
-}
-
 json suspects_to_json(const std::vector<Suspect>& suspects) {
     json list = json::array();
     for (const Suspect& suspect : suspects) {
@@ -35,7 +30,7 @@ json suspects_to_json(const std::vector<Suspect>& suspects) {
 json effect_to_json(const FoundEffect& found) {
     json parameters = json::object(), intervals = json::object();
     for (const CalibratedParameter& number : found.parameters) {
-        const std::string name = short_name(number.parameter.name);
+        const std::string name = number.parameter.short_name();
         const auto [low, high] = interval_of(number);
         parameters[name] = number_or_null(number.value);
         intervals[name] = {number_or_null(low), number_or_null(high)};

@@ -40,8 +40,8 @@ std::string number_in_words(const CalibratedParameter& number) {
     constexpr double z90 = 1.645;
     const Parameter& p = number.parameter;
     const double at = p.to_coordinate(number.value);
-    return quantity_in_words(p.name.substr(p.name.rfind('.') + 1), number.value,
-                             p.to_value(at - z90 * number.sigma), p.to_value(at + z90 * number.sigma));
+    return quantity_in_words(p.short_name(), number.value, p.to_value(at - z90 * number.sigma),
+                             p.to_value(at + z90 * number.sigma));
 }
 
 std::string as_a_sentence(std::string words) {

@@ -24,6 +24,8 @@ struct Parameter {
     bool of_effect = false;  ///< else of the base network
     std::size_t effect = 0;  ///< index into Model::effects when of_effect
 
+    /// "power_W"
+    std::string short_name() const { return name.substr(name.rfind('.') + 1); }
     double to_coordinate(double natural) const { return logarithmic ? std::log(natural) : natural; }
     double to_value(double coordinate) const { return logarithmic ? std::exp(coordinate) : coordinate; }
     /// (coordinate - prior) / sigma; 0 for a flat prior.
