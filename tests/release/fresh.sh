@@ -15,14 +15,16 @@ clean_up() {
     rm -rf --one-file-system "$root"
 }
 trap clean_up EXIT
+chmod 755 "$root"
 mirror=$(apt-get indextargets --format '$(REPO_URI) $(CODENAME)' 'Created-By: Packages' | grep -m1 ' bookworm$' | cut -d' ' -f1)
 debootstrap --variant=minbase --include=ca-certificates,git bookworm "$root" "$mirror" > /dev/null
 cp /etc/resolv.conf /etc/hosts "$root/etc/"
 cp -r /etc/apt/. "$root/etc/apt/"
 # What apt's configuration on this host calls is not there.
 for setting in "$root"/etc/apt/apt.conf.d/*; do grep -qE 'Invoke|Periodic' "$setting" && rm "$setting"; done
-for place in proc sys dev dev/pts; do
+for place in proc sys dev; do
     mount --rbind "/$place" "$root/$place"
+    mount --make-rslave "$root/$place"  # what is unmounted here stays mounted on the host
     mounted+=("$root/$place")
 done
 git clone --quiet . "$root/thermbal"
