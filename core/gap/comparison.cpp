@@ -13,7 +13,7 @@ namespace thermbal {
 namespace {
 
 /// One linear step is all it takes: the readings answer linearly to the starts.
-Result<Inputs> with_estimated_starts(const FitData& data, const Model& model) {
+Result<Inputs> with_estimated_starts(const RecordedTest& test, const FitData& data, const Model& model) {
     const FitProblem problem(data, model);
     const auto point = problem.evaluate(problem.prior_coordinates());
     if (!point) return std::unexpected(point.error());
@@ -27,7 +27,7 @@ Result<Inputs> with_estimated_starts(const FitData& data, const Model& model) {
     }
     const Eigen::VectorXd offsets_C =
         (sensitivity.transpose() * sensitivity).ldlt().solve(-sensitivity.transpose() * point->residual);
-    Inputs inputs = data.seen.inputs;
+    Inputs inputs = inputs_of(test);
     for (Eigen::Index k = 0; k < starts; ++k) {
         for (const std::size_t reading : data.starts[static_cast<std::size_t>(k)].first_readings) {
             inputs.first_readings[reading].value_C += offsets_C(k);
@@ -37,7 +37,7 @@ Result<Inputs> with_estimated_starts(const FitData& data, const Model& model) {
 }
 
 Result<Eigen::MatrixXd> readings_of(const Model& model, const RecordedTest& test, const FitData& data) {
-    const auto inputs = with_estimated_starts(data, model);
+    const auto inputs = with_estimated_starts(test, data, model);
     if (!inputs) return std::unexpected(inputs.error());
     const auto simulation = simulate(model, *inputs, test.time_s);
     if (!simulation) return std::unexpected(simulation.error());

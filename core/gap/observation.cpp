@@ -55,23 +55,55 @@ double mean_sigma_C(double noise_C, double step_C, int count) {
     return std::sqrt(noise_C * noise_C / count + rounding);
 }
 
+/// Means over the bins, NaN where nothing was measured; `count`: of how many rows.
+struct BinMeans {
+    Eigen::VectorXd value;
+    Eigen::VectorXi count;
+};
+
+BinMeans bin_means(const std::vector<double>& values, const Bins& bins) {
+    const auto rows = static_cast<Eigen::Index>(bins.time_s.size());
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(rows);
+    Eigen::VectorXi count = Eigen::VectorXi::Zero(rows);
+    for (std::size_t row = 0; row < values.size(); ++row) {
+        if (!std::isfinite(values[row])) continue;
+        sum(static_cast<Eigen::Index>(bins.of_row[row])) += values[row];
+        ++count(static_cast<Eigen::Index>(bins.of_row[row]));
+    }
+    const auto measured = count.array() > 0;
+    return {measured.select(sum.array() / count.cast<double>().array(), nan), std::move(count)};
+}
+
+/// What drives a simulation of the test. A measured room counts as its mean over each bin: the heat is the
+/// same, the room's noise a step a bin instead of one a scan. Channels that the model has sensors for drive
+/// nothing unless it names them.
+Inputs binned_inputs(const Model& model, const RecordedTest& test, const Bins& bins) {
+    Inputs inputs = inputs_of(test);
+    std::erase_if(inputs.columns, [&](const Column& column) {
+        const bool drives =
+            std::ranges::find(model.sources, column.name, &Source::proportional_to) != model.sources.end() ||
+            model.ambient.column == column.name;
+        return !drives && find_sensor(model, column.name);
+    });
+    for (Column& column : inputs.columns) {
+        if (column.name != model.ambient.column && find_channel(test, column.name) == nullptr) continue;
+        const BinMeans means = bin_means(column.values, bins);
+        for (std::size_t row = 0; row < column.values.size(); ++row)
+            column.values[row] = means.value(static_cast<Eigen::Index>(bins.of_row[row]));
+    }
+    return inputs;
+}
+
 void fill_column(Observation& seen, Eigen::Index column, const std::vector<double>& readings,
                  const Bins& bins, double noise_C) {
     const double step_C = rounding_step_C(readings);
-    const Eigen::Index rows = seen.reading_C.rows();
-    Eigen::VectorXd sum_C = Eigen::VectorXd::Zero(rows);
-    Eigen::VectorXi count = Eigen::VectorXi::Zero(rows);
-    for (std::size_t row = 0; row < readings.size(); ++row) {
-        if (!std::isfinite(readings[row])) continue;
-        sum_C(static_cast<Eigen::Index>(bins.of_row[row])) += readings[row];
-        ++count(static_cast<Eigen::Index>(bins.of_row[row]));
-    }
+    const BinMeans means = bin_means(readings, bins);
     double low_C = std::numeric_limits<double>::infinity(), high_C = -low_C;
-    for (Eigen::Index row = 0; row < rows; ++row) {
-        if (count(row) == 0) continue;
-        const double mean_C = sum_C(row) / count(row);
+    for (Eigen::Index row = 0; row < seen.reading_C.rows(); ++row) {
+        if (means.count(row) == 0) continue;
+        const double mean_C = means.value(row);
         seen.reading_C(row, column) = mean_C;
-        seen.sigma_C(row, column) = mean_sigma_C(noise_C, step_C, count(row));
+        seen.sigma_C(row, column) = mean_sigma_C(noise_C, step_C, means.count(row));
         low_C = std::min(low_C, mean_C);
         high_C = std::max(high_C, mean_C);
     }
@@ -141,7 +173,7 @@ Result<Observation> observe(const Model& model, const RecordedTest& test, double
     }
     const Bins bins = make_bins(test.time_s, bin_s);
     seen.bin_s = bin_s;
-    seen.inputs = inputs_of(test);
+    seen.inputs = binned_inputs(model, test, bins);
     seen.time_s = bins.time_s;
     const auto rows = static_cast<Eigen::Index>(seen.rows());
     const auto columns = static_cast<Eigen::Index>(seen.columns());

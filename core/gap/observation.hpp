@@ -14,7 +14,7 @@ namespace thermbal {
 
 /// A recorded test as a fit sees it: averages over bins, for the sensors of one model.
 struct Observation {
-    Inputs inputs;
+    Inputs inputs;               ///< what drives the model; a measured room as its means over the bins
     std::vector<double> time_s;  ///< rows: mean time of each bin
     double bin_s = 0.0;
     std::vector<std::size_t> sensors;   ///< columns: indices into Model::sensors of those that were measured

@@ -7,10 +7,21 @@ namespace thermbal {
 
 using Eigen::Index;
 
+namespace {
+
+/// Backwards is as warm as forwards.
+double power_share(const CompiledSource& source, double value) {
+    const double share = std::abs(value / source.reference);
+    return source.exponent == 1.0 ? share : std::pow(share, source.exponent);
+}
+
+}  // namespace
+
 HeatFlow::HeatFlow(const CompiledNetwork& network, InputSchedule& schedule)
     : network_(network),
       schedule_(schedule),
       drive_(network.sources.size(), 1.0),
+      powered_(network.sources.size()),
       thermostat_on_(network.thermostats.size(), 0) {}
 
 void HeatFlow::begin_step(double from_s, double to_s) {
@@ -22,9 +33,9 @@ void HeatFlow::begin_step(double from_s, double to_s) {
         const CompiledSource& source = network_.sources[i];
         drive_[i] = stopped ? 0.0 : 1.0;
         if (stopped || source.column == no_column) continue;
-        // Backwards is as warm as forwards.
-        const double share = std::abs(schedule_.at(source.column, step_middle_s_) / source.reference);
-        drive_[i] = source.exponent == 1.0 ? share : std::pow(share, source.exponent);
+        const double value = schedule_.at(source.column, step_middle_s_);
+        if (value != powered_[i].value) powered_[i] = {value, power_share(source, value)};
+        drive_[i] = powered_[i].share;
     }
     room_C_ = network_.ambient_column == no_column ? network_.ambient_C
                                                    : schedule_.at(network_.ambient_column, step_middle_s_);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -33,7 +34,13 @@ class HeatFlow {
 
     const CompiledNetwork& network_;
     InputSchedule& schedule_;
+    /// What a column's value makes of a source's power, kept as long as the value stays.
+    struct Powered {
+        double value = std::numeric_limits<double>::quiet_NaN();
+        double share = 0.0;
+    };
     std::vector<double> drive_;
+    std::vector<Powered> powered_;
     std::vector<char> thermostat_on_;
     double step_middle_s_ = 0.0;
     double room_C_ = 0.0;

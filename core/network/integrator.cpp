@@ -45,7 +45,9 @@ std::vector<double> Integrator::grid(std::span<const double> sample_times_s) con
     moments.push_back(start_s_);
     std::ranges::copy_if(breaks_s_, std::back_inserter(moments),
                          [&](double time_s) { return time_s > start_s_ && time_s < end_s; });
-    std::ranges::sort(moments);
+    const auto samples_end = moments.begin() + static_cast<std::ptrdiff_t>(sample_times_s.size());
+    std::sort(samples_end, moments.end());
+    std::inplace_merge(moments.begin(), samples_end, moments.end());
     moments.erase(std::ranges::unique(moments).begin(), moments.end());
     return moments;
 }
@@ -222,6 +224,61 @@ double Integrator::longest_step_s() const {
     return std::numeric_limits<double>::infinity();
 }
 
+bool Integrator::is_exact_throughout() const {
+    return !network_.smooth && network_.thermostats.empty() && !sensors_.needs_slopes();
+}
+
+void Integrator::exact_regime(std::span<const double> moments, ExactRun& run) {
+    // Heat of every interval first, so that one product takes all of it to the modes; likewise back.
+    const auto intervals = static_cast<Index>(moments.size()) - 1;
+    Eigen::MatrixXd modal_heat(modal_.size(), intervals);
+    for (Index i = 0; i < intervals; ++i) {
+        const auto at = static_cast<std::size_t>(i);
+        heat_.begin_step(moments[at], moments[at + 1]);
+        heat_.evaluate(moments[at], node_C_, system_->surface_W_per_K, heat_W_);
+        modal_heat.col(i) = heat_W_;
+        run.ambient_C.push_back(heat_.ambient_C(moments[at]));
+    }
+    modal_heat = system_->to_modal * modal_heat;
+    Eigen::MatrixXd modal(modal_.size(), intervals + 1);
+    modal.col(0) = modal_;
+    for (Index i = 0; i < intervals; ++i) {
+        const StepFactors& f =
+            factors(moments[static_cast<std::size_t>(i) + 1] - moments[static_cast<std::size_t>(i)]);
+        modal.col(i + 1) = f.decay * modal.col(i).array() + f.whole * modal_heat.col(i).array();
+    }
+    modal_ = modal.col(intervals);
+    const Index first = static_cast<Index>(run.ambient_C.size()) - intervals;
+    run.node_C.middleCols(first, intervals + 1).noalias() = system_->to_nodal * modal;
+    node_C_ = run.node_C.col(first + intervals);
+    steps_ += static_cast<int>(intervals);
+}
+
+Result<void> Integrator::run_exact(std::span<const double> sample_times_s, std::span<const double> moments,
+                                   const AtSample& at_sample) {
+    ExactRun run{Eigen::MatrixXd(node_C_.size(), static_cast<Index>(moments.size())), {}};
+    run.node_C.col(0) = node_C_;
+    for (std::size_t regime = 0, from = 0; regime < regimes_.size(); ++regime) {
+        const double until_s = regime + 1 < regimes_.size() ? regimes_[regime + 1].from_s
+                                                            : std::numeric_limits<double>::infinity();
+        const auto change = std::ranges::lower_bound(moments, until_s) - moments.begin();
+        const std::size_t to = std::min(static_cast<std::size_t>(change), moments.size() - 1);
+        enter_regime(regime);
+        if (to > from) exact_regime(moments.subspan(from, to - from + 1), run);
+        from = std::max(from, to);
+    }
+    heat_.begin_step(moments.back(), moments.back());
+    run.ambient_C.push_back(heat_.ambient_C(moments.back()));
+    std::size_t sample = 0;
+    for (std::size_t i = 0; i < moments.size(); ++i) {
+        node_C_ = run.node_C.col(static_cast<Index>(i));
+        if (!(node_C_.lpNorm<Eigen::Infinity>() < runaway_C)) return run_away(moments[i]);
+        if (sample < sample_times_s.size() && sample_times_s[sample] == moments[i])
+            at_sample(sample++, node_C_, run.ambient_C[i]);
+    }
+    return {};
+}
+
 Result<void> Integrator::run(const Eigen::VectorXd& initial_C, std::span<const double> sample_times_s,
                              const AtSample& at_sample) {
     const std::vector<double> moments = grid(sample_times_s);
@@ -230,6 +287,7 @@ Result<void> Integrator::run(const Eigen::VectorXd& initial_C, std::span<const d
     auto sample = sample_times_s.begin();
     node_C_ = initial_C;
     enter_regime(regime);
+    if (is_exact_throughout()) return run_exact(sample_times_s, moments, at_sample);
     heat_.begin_step(moments.front(), moments.front());
     sensors_.begin(moments.front(), node_C_, heat_.ambient_C(moments.front()));
     switch_thermostats(moments.front());

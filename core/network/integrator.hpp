@@ -47,6 +47,18 @@ class Integrator {
     void enter_regime(std::size_t regime);
     const StepFactors& factors(double h_s);
     double longest_step_s() const;
+    /// Heat is constant between two moments of the grid, and no sensor asks what happens between them.
+    bool is_exact_throughout() const;
+    /// Such a network: every interval one exact step, the nodes' temperatures of all samples at once.
+    Result<void> run_exact(std::span<const double> sample_times_s, std::span<const double> moments,
+                           const AtSample& at_sample);
+    /// What happened at the moments of the grid so far: nodes x moments.
+    struct ExactRun {
+        Eigen::MatrixXd node_C;
+        std::vector<double> ambient_C;
+    };
+    /// One regime of it, from node_C_ at the first of its moments to the last.
+    void exact_regime(std::span<const double> moments, ExactRun& run);
     Result<void> advance(double from_s, double to_s);
     /// A step from the state modal_ at from_s into next_modal_ and next_C_; returns its estimated error.
     double try_step(double from_s, double h_s);
