@@ -12,8 +12,11 @@ using Eigen::Index;
 
 constexpr double as_good_as_fixed = 1e-3;  ///< relative
 
-bool stopped_at_lower_bound(const Parameter& parameter, double at) {
-    return parameter.of_effect && !parameter.is_time && !parameter.logarithmic && at <= parameter.lower;
+/// So many standard deviations above its bound a size's mean is its mode: the bound takes 0.1 % away.
+constexpr double far_from_bound = 3.0;
+
+bool is_one_sided_size(const Parameter& parameter) {
+    return parameter.of_effect && !parameter.is_time && !parameter.logarithmic && parameter.lower >= 0.0;
 }
 
 }  // namespace
@@ -28,17 +31,22 @@ double mean_above(double bound, double mean, double sigma) {
 Result<Explanation> with_expected_sizes(const Evidence& evidence, const Explanation& explanation) {
     const Fit& fit = explanation.fit;
     const std::size_t known = evidence.prior_model.effects.size();
-    const Eigen::VectorXd slope = fit.jacobian.transpose() * fit.point.residual;
     const Eigen::LDLT<Eigen::MatrixXd> hessian(fit.hessian);
+    // Where the fit would go without bounds: what is left of the other slopes counts, too, where a size may
+    // be far off for next to nothing.
+    const Eigen::VectorXd free =
+        fit.point.coordinates - hessian.solve(fit.jacobian.transpose() * fit.point.residual);
     Explanation expected = explanation;
     bool moved = false;
     for (std::size_t i = 0; i < fit.parameters.size(); ++i) {
         const Parameter& parameter = fit.parameters[i];
         const auto k = static_cast<Index>(i);
         const double at = fit.point.coordinates(k);
-        if (!stopped_at_lower_bound(parameter, at) || parameter.effect < known) continue;
-        const double variance = hessian.solve(Eigen::VectorXd::Unit(slope.size(), k))(k);
-        const double size = mean_above(parameter.lower, at - variance * slope(k), std::sqrt(variance));
+        if (!is_one_sided_size(parameter) || parameter.effect < known) continue;
+        const double variance = hessian.solve(Eigen::VectorXd::Unit(free.size(), k))(k);
+        const double sigma = std::sqrt(variance);
+        if (at > parameter.lower + far_from_bound * sigma) continue;
+        const double size = mean_above(parameter.lower, free(k), sigma);
         for (EffectParameter& number : expected.effects[parameter.effect - known].parameters) {
             if (number.name != parameter.short_name()) continue;
             number.value = size;

@@ -32,6 +32,8 @@ std::vector<Effect> one_of_each() {
          {}},
         {"friction_viscosity", "", "bearing", {{"beta_per_K", 0.03}, {"reference_C", 22.0}}, {}},
         {"preload_growth", "", "bearing", {{"growth_per_K", 0.08}}, {}},
+        {"preload_growth", "to_first_neighbour", "bearing", {{"growth_per_K", 0.07}}, {}},
+        {"preload_growth", "to_second_neighbour", "bearing", {{"growth_per_K", 0.06}}, {}},
         {"run_in_heat", "", "bearing", {{"power_W", 60.0}, {"time_constant_s", 1300.0}}, {}},
         {"run_in_heat", "any_speed", "bearing", {{"power_W", 45.0}, {"time_constant_s", 1700.0}}, {}},
         {"motor_heat", "", "housing", {{"power_W", 75.0}}, {}},

@@ -89,6 +89,8 @@ class Network:
         for effect in self.of("preload_growth"):
             if effect["source"] == node:
                 around = [(b if a == node else a, g) for a, b, g in self.links if node in (a, b) and "ambient" not in (a, b)]
+                if effect.get("form"):
+                    around = [around[("to_first_neighbour", "to_second_neighbour").index(effect["form"])]]
                 housing = sum(g * T[other] for other, g in around) / sum(g for _, g in around)
                 power *= max(0.0, 1 + effect["growth_per_K"] * (T[node] - housing))
         for effect in self.of("run_in_heat"):
