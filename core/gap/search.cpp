@@ -32,6 +32,36 @@ Support support_of(const Survey& survey, const Odds& odds) {
                : Support::none;
 }
 
+Survey without_forecasts(Survey survey) {
+    for (Contender& contender : survey.contenders) {
+        contender.log_bayes_factor -= contender.explanation.log_prediction;
+        contender.explanation.log_prediction = 0.0;
+    }
+    return survey;
+}
+
+/// What is taken next, and the odds that say so.
+struct Choice {
+    Support support;
+    Odds odds;
+};
+
+/// Where two effects are missing, one may forecast best without describing the run, and the other describe
+/// the run. The nameless, which has the forecast of the one, then beats both. What describes the run by
+/// itself better than the nameless, and forecasts no worse than nothing, is taken in doubt: the doubt is
+/// lifted when the other completes the picture.
+Choice choose(const Survey& survey, const Model& model) {
+    Odds odds = odds_of(survey, model);
+    const Support support = support_of(survey, odds);
+    if (support != Support::none || !odds.something_is_missing()) return {support, std::move(odds)};
+    const Survey of_the_run = without_forecasts(survey);
+    Odds by_the_run = odds_of(of_the_run, model);
+    if (support_of(of_the_run, by_the_run) != Support::name ||
+        best_of(survey, by_the_run).explanation.log_prediction < 0.0)
+        return {support, std::move(odds)};
+    return {Support::relative, std::move(by_the_run)};
+}
+
 /// The node where an effect shows: a channel's is the one that its sensor sits on; empty where it acts
 /// everywhere.
 std::string node_of(const Effect& effect, const Model& model) {
@@ -88,8 +118,7 @@ Result<void> stand_at(const Explanation& best, Evidence& evidence, SearchResult&
 Result<void> take_effects(Evidence& evidence, SearchResult& search, const DiagnoseOptions& options) {
     while (true) {
         Survey found = survey(evidence, search.current);
-        Odds odds = odds_of(found, search.current.fit.model);
-        const Support support = support_of(found, odds);
+        auto [support, odds] = choose(found, search.current.fit.model);
         const bool taken =
             support != Support::none && static_cast<int>(search.steps.size()) < options.max_effects;
         if (taken) {
@@ -116,9 +145,8 @@ Result<bool> look_again(Evidence& evidence, SearchResult& search) {
     if (!without) return std::unexpected(without.error());
     let_go_of_others(evidence, without->effects);
     const Survey found = survey(evidence, *without);
-    Odds odds = odds_of(found, without->fit.model);
+    auto [support, odds] = choose(found, without->fit.model);
     search.steps.erase(search.steps.begin());
-    const Support support = support_of(found, odds);
     if (support == Support::none) {
         search.current = std::move(*without);
         return true;
