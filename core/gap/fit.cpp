@@ -108,12 +108,38 @@ class Slope {
     Eigen::MatrixXd jacobian_, hessian_;
 };
 
+/// A step that makes the fit better, and by how much of chi2 the sensitivities promised.
+struct Step {
+    FitPoint point;
+    double promised;
+};
+
+/// Damped until it does; none where no step promises anything. Leaves in `damping` where the next begins.
+std::optional<Step> better_step(const FitProblem& problem, const Slope& slope, const FitPoint& from,
+                                double& damping, double chi2_tolerance) {
+    const Eigen::VectorXd lower = problem.lower(), upper = problem.upper();
+    const Eigen::VectorXd gradient = slope.jacobian().transpose() * from.residual;
+    for (int attempt = 0; attempt < 8; ++attempt) {
+        const Eigen::VectorXd step =
+            damped_step(slope.hessian(), gradient, from.coordinates, lower, upper, damping);
+        const double promised = -step.dot(2.0 * gradient + slope.hessian() * step);
+        auto next = problem.evaluate(from.coordinates + step);
+        if (next && next->chi2 < from.chi2) {
+            damping = std::max(damping * 0.1, 1e-9);
+            return Step{std::move(*next), promised};
+        }
+        if (promised < chi2_tolerance) return {};
+        damping = std::max(damping, 1e-4) * 8.0;
+    }
+    return {};
+}
+
 }  // namespace
 
 Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const CalibrationOptions& options,
                      const ParallelFor& parallel_for) {
-    const Eigen::VectorXd lower = problem.lower(), upper = problem.upper();
-    auto first = problem.evaluate(start.coordinates.cwiseMax(lower).cwiseMin(upper));
+    constexpr int most_steps_at_once = 8;
+    auto first = problem.evaluate(start.coordinates.cwiseMax(problem.lower()).cwiseMin(problem.upper()));
     if (!first) return std::unexpected(first.error());
     Fit fit{{}, problem.parameters(), std::move(*first), {}, {}, 0, false};
     double damping = 1e-3;
@@ -124,25 +150,16 @@ Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const Cal
         problem.steers_itself() ? std::min(options.max_iterations, 15) : options.max_iterations;
     while (fit.iterations < most_iterations && !fit.converged) {
         ++fit.iterations;
-        const Eigen::VectorXd gradient = slope.jacobian().transpose() * fit.point.residual;
-        bool better = false;
-        for (int attempt = 0; attempt < 8 && !better; ++attempt) {
-            const Eigen::VectorXd step =
-                damped_step(slope.hessian(), gradient, fit.point.coordinates, lower, upper, damping);
-            const double promised = -step.dot(2.0 * gradient + slope.hessian() * step);
-            auto next = problem.evaluate(fit.point.coordinates + step);
-            if (next && next->chi2 < fit.point.chi2) {
-                better = true;
-                fit.converged = fit.point.chi2 - next->chi2 < options.chi2_tolerance;
-                fit.point = std::move(*next);
-                damping = std::max(damping * 0.1, 1e-9);
-            } else if (promised < options.chi2_tolerance) {
-                break;
-            } else {
-                damping = std::max(damping, 1e-4) * 8.0;
-            }
+        // Sensitivities cost as much as all coordinates together, a step one simulation: as long as they
+        // promise about what happens, further steps are taken with them.
+        for (int steps = 0; steps < most_steps_at_once; ++steps) {
+            const auto step = better_step(problem, slope, fit.point, damping, options.chi2_tolerance);
+            const double gained = step ? fit.point.chi2 - step->point.chi2 : 0.0;
+            if (steps == 0) fit.converged = gained < options.chi2_tolerance;
+            if (!step) break;
+            fit.point = step->point;
+            if (gained < options.chi2_tolerance || gained < 0.5 * step->promised) break;
         }
-        fit.converged = fit.converged || !better;
         if (fit.converged) break;
         if (auto done = slope.follow(fit.point); !done) return std::unexpected(done.error());
     }
