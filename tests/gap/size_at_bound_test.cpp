@@ -53,6 +53,25 @@ TEST(ExpectedSize, IsMoreThanNoneWhereTheFitStoppedAtNone) {
     EXPECT_LT(expected->fit.point.chi2, fitted->fit.point.chi2 + 6.0);
 }
 
+/// Just above its bound a size is as little known as at it.
+TEST(ExpectedSize, IsMoreThanTheLikeliestNearTheBound) {
+    Model truth = small_machine();
+    truth.effects.push_back({"preload_growth", "", "bearing", {{"growth_per_K", 0.0005, 0.0}}, {}});
+    Evidence evidence;
+    evidence.prior_model = small_machine();
+    evidence.run = make_fit_data(small_machine(), measured_on(truth, 300.0, 0.05, 3), {}).value();
+    evidence.parallel_for = sequential_for;
+    const auto fitted =
+        explain(evidence, {{"preload_growth", "", "bearing", {{"growth_per_K", 0.03, 0.0}}, {}}}, nullptr);
+    ASSERT_TRUE(fitted.has_value());
+    const double likeliest = fitted->fit.model.effects[0].parameter("growth_per_K");
+    ASSERT_GT(likeliest, 0.0);
+    const auto expected = with_expected_sizes(evidence, *fitted);
+    ASSERT_TRUE(expected.has_value());
+    EXPECT_GT(expected->fit.model.effects[0].parameter("growth_per_K"), 1.2 * likeliest);
+    EXPECT_LT(expected->fit.point.chi2, fitted->fit.point.chi2 + 2.0);
+}
+
 TEST(ExpectedSize, IsTheFittedOneElsewhere) {
     Model truth = small_machine();
     truth.effects.push_back({"preload_growth", "", "bearing", {{"growth_per_K", 0.05, 0.0}}, {}});

@@ -57,8 +57,10 @@ std::vector<double> sample_times() {
     return every(60.0, 6000.0);
 }
 
+/// The bearing sits between two nodes, as preload that grows with the difference to one of them needs it.
 Model with(std::vector<Effect> effects) {
     Model model = spindle_head();
+    add_link(model, "bearing", "motor", 4.0);
     model.effects = std::move(effects);
     return model;
 }
