@@ -30,19 +30,16 @@ Whitening::Whitening(const Observation& seen, const ModelFidelity& fidelity)
 }
 
 Eigen::VectorXd Whitening::operator()(const Eigen::MatrixXd& difference_C) const {
+    const Eigen::Index rows = difference_C.rows(), columns = difference_C.cols();
     Eigen::VectorXd white(difference_C.size());
-    Eigen::Index out = 0;
-    for (Eigen::Index column = 0; column < difference_C.cols(); ++column) {
-        double wander_C = 0.0;
-        for (Eigen::Index row = 0; row < difference_C.rows(); ++row, ++out) {
-            wander_C *= keep_(row, column);
-            if (scale_(row, column) == 0.0) {
-                white(out) = 0.0;
-                continue;
-            }
-            const double innovation_C = difference_C(row, column) - wander_C;
-            white(out) = innovation_C * scale_(row, column);
-            wander_C += gain_(row, column) * innovation_C;
+    Eigen::VectorXd wander_C = Eigen::VectorXd::Zero(columns);
+    for (Eigen::Index row = 0; row < rows; ++row) {
+        for (Eigen::Index column = 0; column < columns; ++column) {
+            const double expected_C = keep_(row, column) * wander_C(column);
+            const bool measured = scale_(row, column) != 0.0;
+            const double innovation_C = measured ? difference_C(row, column) - expected_C : 0.0;
+            white(column * rows + row) = innovation_C * scale_(row, column);
+            wander_C(column) = expected_C + gain_(row, column) * innovation_C;
         }
     }
     return white;

@@ -25,9 +25,11 @@ class Whitening {
     int readings() const { return readings_; }
 
   private:
-    Eigen::MatrixXd keep_;  ///< how much of the wander survives from the row before
-    Eigen::MatrixXd gain_;
-    Eigen::MatrixXd scale_;  ///< 1 / standard deviation of the innovation; 0 where nothing was measured
+    /// Row by row: the channels of a row do not wait for each other.
+    using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    Rows keep_;  ///< how much of the wander survives from the row before
+    Rows gain_;
+    Rows scale_;  ///< 1 / standard deviation of the innovation; 0 where nothing was measured
     double log_determinant_ = 0.0;
     int readings_ = 0;
 };

@@ -72,10 +72,14 @@ const Integrator::StepFactors& Integrator::factors(double h_s) {
     }
     for (Index i = 0; i < modes; ++i) {
         const double z = -system_->rate_per_s[i] * h_s;
+        if (!network_.smooth) {
+            made.decay[i] = std::exp(z);
+            made.whole[i] = z == 0.0 ? h_s : h_s * std::expm1(z) / z;
+            continue;
+        }
         const auto phi = phi_functions<4>(z);
         made.decay[i] = phi[0];
         made.whole[i] = h_s * phi[1];
-        if (!network_.smooth) continue;
         const auto phi_half = phi_functions<4>(0.5 * z);
         made.decay_half[i] = phi_half[0];
         made.half[i] = 0.5 * h_s * phi_half[1];

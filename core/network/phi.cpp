@@ -19,8 +19,9 @@ std::array<double, Count> phi_functions(double z) {
         return phi;
     }
     constexpr int terms = 18;
+    constexpr double lost_in_rounding = 1e-18;
     double term = inverse_factorial[Count - 1];
-    for (int j = 0; j < terms; ++j) {
+    for (int j = 0; j < terms && std::abs(term) > lost_in_rounding; ++j) {
         phi[Count - 1] += term;
         term *= z / static_cast<double>(static_cast<int>(Count) + j);
     }
