@@ -1,12 +1,15 @@
 #!/usr/bin/python3
-"""clang-tidy on every source, or on what a change touches; two at a time.
+"""clang-tidy on every source, on those of some rooms, or on what a change touches; two at a time.
 
-    tests/tidy.py [--changed-since COMMIT] [--build build/tidy]
+    tests/tidy.py [ROOM ...] [--changed-since COMMIT] [--build build/tidy-UnifiedSource]
 
-A source that passed is not judged again while nothing it depends on has changed: what counts is its whole text after
-preprocessing (comments kept: NOLINT is one), its compile command, .clang-tidy and the version of clang-tidy. Passed ones are
-remembered in $XDG_CACHE_HOME/thermbal-tidy (~/.cache). With --changed-since: the sources that changed since, and those that
-include a header that did.
+The preset tidy compiles sources by the dozen, so that their headers are judged once. The static analyzer looks into a source that
+another one includes only where the including one's path has the word UnifiedSource in it: hence the folder's name.
+
+What passed is not judged again while nothing it depends on has changed: what counts is its whole text after
+preprocessing (comments kept: NOLINT is one), its compile command, .clang-tidy and the version of clang-tidy. It is
+remembered in $XDG_CACHE_HOME/thermbal-tidy (~/.cache). With --changed-since: the sources that changed since, those that
+include a header that did, and those compiled with them.
 """
 import argparse
 import concurrent.futures
@@ -45,10 +48,14 @@ def flags_of(entry):
 
 
 def key_of(entry, settings):
-    digest = hashlib.sha256(settings)
-    digest.update(entry["command"].encode())
-    digest.update(dependencies(entry, flags_of(entry), "-E", "-C"))
-    return digest.hexdigest()
+    text = entry["command"].encode() + dependencies(entry, flags_of(entry), "-E", "-C")
+    return hashlib.sha256(settings + text.replace(os.fsencode(os.getcwd()), b"")).hexdigest()
+
+
+def sources_of(entry):
+    """The sources that are compiled by it: itself, or those it includes."""
+    included = re.findall(r'^#include "(/.*\.cpp)"$', pathlib.Path(entry["file"]).read_text(encoding="utf-8"), re.MULTILINE)
+    return included or [entry["file"]]
 
 
 def judged(entry, settings, build):
@@ -56,7 +63,7 @@ def judged(entry, settings, build):
     passed = PASSED / key_of(entry, settings)
     if passed.exists():
         return entry["file"], "", True
-    done = subprocess.run([TIDY, "-p", build, "--quiet", entry["file"]], capture_output=True, text=True, check=False)
+    done = subprocess.run([TIDY, "-p", build, "--quiet", "--checks=-bugprone-suspicious-include", entry["file"]], capture_output=True, text=True, check=False)
     if done.returncode == 0 and "warning:" not in done.stdout:
         passed.touch()
         return entry["file"], "", False
@@ -67,7 +74,7 @@ def touched(entries, commit):
     changed = {str(pathlib.Path(name).resolve()) for name in
                output_of("git", "diff", "--name-only", "--diff-filter=d", commit, "--", "*.cpp", "*.hpp").split()}
     for entry in entries:
-        if entry["file"] in changed:
+        if changed.intersection(sources_of(entry)):
             yield entry
         elif any(name.endswith(".hpp") for name in changed):
             listed = dependencies(entry, flags_of(entry), "-MM").decode()
@@ -78,12 +85,17 @@ def touched(entries, commit):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("rooms", nargs="*", metavar="ROOM")
     parser.add_argument("--changed-since", metavar="COMMIT")
-    parser.add_argument("--build", default="build/tidy")
+    parser.add_argument("--build", default="build/tidy-UnifiedSource")
     arguments = parser.parse_args()
     tracked = {str(pathlib.Path(name).resolve()) for name in output_of("git", "ls-files", "*.cpp").split()}
     database = json.loads((pathlib.Path(arguments.build) / "compile_commands.json").read_text(encoding="utf-8"))
-    entries = list({entry["file"]: entry for entry in database if entry["file"] in tracked}.values())
+    entries = list({entry["file"]: entry for entry in database if tracked.intersection(sources_of(entry))}.values())
+    if arguments.rooms:
+        rooms = [pathlib.Path(room).resolve() for room in arguments.rooms]
+        entries = [entry for entry in entries
+                   if any(pathlib.Path(source).is_relative_to(room) for source in sources_of(entry) for room in rooms)]
     if arguments.changed_since:
         entries = list(touched(entries, arguments.changed_since))
     PASSED.mkdir(parents=True, exist_ok=True)
@@ -95,7 +107,8 @@ def main():
             if said:
                 bad += 1
                 print(f"{file}:\n{said}", flush=True)
-    print(f"clang-tidy: {len(entries)} sources, {known} of them as they were when they passed, {bad} not clean")
+    sources = sum(len(sources_of(entry)) for entry in entries)
+    print(f"clang-tidy: {sources} sources compiled as {len(entries)}, {known} of these as they were when they passed, {bad} not clean")
     return 1 if bad else 0
 
 
