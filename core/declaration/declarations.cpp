@@ -95,17 +95,17 @@ std::vector<DeclarationChange> Declarations::update(const std::vector<ChannelVer
             next.push_back(now);
             continue;
         }
-        const bool better = renewals == Renewals::wanted && known_better(*before, now);
+        // A sensor that no longer reads says nothing about what was declared.
+        const bool reads = now.state != ChannelState::dead && now.state != ChannelState::stuck;
+        const bool better = reads && renewals == Renewals::wanted && known_better(*before, now);
         if (last_change_min > before->declared_at_min) {
             const std::string why = fmt::format(
                 "the machine's inputs or its room changed at {:.1f} min, after the declaration at {:.1f} min",
                 last_change_min, before->declared_at_min);
             change(DeclarationChange::Kind::withdrawn, now, why, measured_on(now, why));
-        } else if (now.state == ChannelState::dead || now.state == ChannelState::stuck) {
-            next.push_back(*before);
         } else if (better && now.declared()) {
             change(DeclarationChange::Kind::renewed, now, then_and_now(*before, now), renewed(*before, now));
-        } else if (better || apart(*before, now)) {
+        } else if (better || (reads && apart(*before, now))) {
             const std::string why = then_and_now(*before, now);
             change(DeclarationChange::Kind::withdrawn, now, why, measured_on(now, why));
         } else {
