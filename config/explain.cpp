@@ -15,6 +15,7 @@ namespace {
 std::string explain_inputs(const std::vector<KnownInput>& inputs) {
     if (inputs.empty()) return "";
     std::vector<std::string> values;
+    values.reserve(inputs.size());
     for (const KnownInput& input : inputs) values.push_back(fmt::format("{} = {}", input.name, input.value));
     return fmt::format("inputs = {{ {} }}\n", fmt::join(values, ", "));
 }

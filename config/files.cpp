@@ -52,8 +52,8 @@ Result<std::string> read_text_file(const std::string& path, std::size_t most_byt
     if (!file) return refuse_file(path, std::generic_category().message(errno));
     std::string text;
     std::string buffer(std::size_t{1} << 16, '\0');
-    for (std::size_t got = 0; (got = std::fread(buffer.data(), 1, buffer.size(), file.get())) > 0;) {
-        text.append(buffer, 0, got);
+    while (std::feof(file.get()) == 0 && std::ferror(file.get()) == 0) {
+        text.append(buffer, 0, std::fread(buffer.data(), 1, buffer.size(), file.get()));
         if (text.size() > most_bytes) {
             return refuse_file(path, fmt::format("is larger than {} MiB", most_bytes >> 20));
         }

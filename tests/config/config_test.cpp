@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <random>
 
 #include <fmt/format.h>
@@ -225,10 +226,7 @@ TEST(Profiles, AUserFolderComesFirstAndAPathIsTaken) {
     const fs::path folder = fs::path(::testing::TempDir()) / "thermbal_profiles";
     fs::create_directories(folder);
     const std::string path = (folder / "mb8art.toml").string();
-    std::FILE* file = std::fopen(path.c_str(), "w");
-    ASSERT_NE(file, nullptr);
-    std::fputs("source = \"my own\"\ninputs = 2\n", file);
-    std::fclose(file);
+    std::ofstream(path) << "source = \"my own\"\ninputs = 2\n";
     EXPECT_EQ(profiles_in({folder.string(), source_dir + "/config/profiles"})("mb8art")->inputs, 2);
     EXPECT_EQ(profiles_in({})(path)->source, "my own");
     EXPECT_THAT(profiles_in({folder.string()})("nothing").error().message, HasSubstr("mb8art"));
