@@ -67,7 +67,7 @@ class Facts {
 }  // namespace
 
 std::string state_name(const json& channel) {
-    const std::string state = text(channel, "state");
+    std::string state = text(channel, "state");
     if (state == "barely_warming") return "no rise";
     if (!state.empty()) return state;
     return text(channel, "role") == "ambient" ? "ambient" : "-";
@@ -284,7 +284,7 @@ std::string unit_details(const json& unit) {
         if (count < 1.0) continue;
         const auto bound = number(bucket, "up_to_ms");
         trips += fmt::format("{}{} {}", trips.empty() ? "" : ", ", whole(count),
-                             bound ? fmt::format("up to {} ms", whole(*bound)) : std::string("longer"));
+                             bound ? fmt::format("up to {} ms", whole(bound)) : std::string("longer"));
     }
     std::string errors;
     for (const auto& [kind, count] : object_in(unit, "errors").items()) {

@@ -26,6 +26,7 @@ using Clock = std::chrono::steady_clock;
     if (getppid() != parent) _exit(127);  // the parent died before this line
     setpgid(0, 0);
     const int nowhere = open("/dev/null", O_RDWR | O_CLOEXEC);
+    if (nowhere < 0) _exit(127);
     dup2(nowhere, STDIN_FILENO);
     dup2(output_fd >= 0 ? output_fd : nowhere, STDOUT_FILENO);
     execv(words[0], words.data());
@@ -38,6 +39,7 @@ Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& words, 
     if (access(words.front().c_str(), X_OK) != 0)
         return fail(NextStep::stop, fmt::format("{}: {}", words.front(), errno_text(errno)));
     std::vector<char*> arguments;
+    arguments.reserve(words.size() + 1);
     for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
     arguments.push_back(nullptr);
     std::array<int, 2> ends = {-1, -1};

@@ -86,10 +86,11 @@ std::string comparison_svg(const json& document) {
     for (std::size_t i = 0; i < panels; ++i) {
         const json& channel = document["channels"][i];
         const Plot plot = channel_plot(document, channel, i);
+        const std::size_t row = i / columns;
         drawn += fmt::format(
             R"html(<g transform="translate({:.0f},{:.0f})"><text x="0" y="16">{}</text>{}</g>)html",
             static_cast<double>(i % columns) * panel_width_px,
-            key_height_px + static_cast<double>(i / columns) * panel_height_px, escaped(plot.title),
+            key_height_px + static_cast<double>(row) * panel_height_px, escaped(plot.title),
             svg_plot(plot, channel_table(document, channel, i), true));
         if (i > 0) continue;
         double x = 0.0;

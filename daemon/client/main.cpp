@@ -15,6 +15,8 @@ std::string one_line(const CLI::App* app, const CLI::Error& error) {
 
 }  // namespace
 
+// What nobody expects to be thrown ends the program with what it says.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
     std::setlocale(LC_CTYPE, "");  // NOLINT(concurrency-mt-unsafe): before anything else runs
     CLI::App app("Asks a running thermbald over its socket, and does the same work offline on files.",

@@ -18,6 +18,7 @@ std::vector<double> times_of(const TestReport& report) {
     constexpr double past_balance = 1.15, most_beyond_s = 24.0 * 3600.0;
     const TestWindow& window = report.window;
     std::vector<double> time_s;
+    time_s.reserve(window.scans + points);
     for (std::size_t scan = 0; scan < window.scans; ++scan) time_s.push_back(window.time_s(scan));
     double until_s = window.end_s();
     for (const ReportChannel& channel : report.channels) {

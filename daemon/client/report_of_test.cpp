@@ -25,7 +25,8 @@ FlowOptions configured_flow(const std::string& config_toml) {
         const toml::table config = toml::parse(config_toml);
         flow.tolerance_C = config["identification"]["tolerance_C"].value_or(flow.tolerance_C);
         sweep_always = config["identification"]["sweep_always"].value_or(sweep_always);
-    } catch (const toml::parse_error&) {  // a test is shown whatever its configuration looked like
+        // A test is shown whatever its configuration looked like. NOLINTNEXTLINE(bugprone-empty-catch)
+    } catch (const toml::parse_error&) {
     }
     if (sweep_always) flow.sweep_when = SweepWhen::always;
     return flow;

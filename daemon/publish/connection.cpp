@@ -1,11 +1,12 @@
 #include "connection.hpp"
 
 #include <cerrno>
-#include <cstring>
 #include <utility>
 
 #include <fmt/format.h>
 #include <mosquitto.h>
+
+#include "base/errno_text.hpp"
 
 namespace thermbal {
 namespace {
@@ -18,7 +19,7 @@ void prepare_library() {
 }
 
 std::string reason(int code) {
-    return code == MOSQ_ERR_ERRNO ? std::strerror(errno) : mosquitto_strerror(code);
+    return code == MOSQ_ERR_ERRNO ? errno_text(errno) : mosquitto_strerror(code);
 }
 
 const char* or_null(const std::string& text) {

@@ -96,6 +96,8 @@ int run(Publisher& publisher, bool once) {
 
 }  // namespace
 
+// What nobody expects to be thrown ends the program with what it says.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
     CLI::App app("Sends what thermbald stores to an MQTT broker: samples, declarations, events, the state.",
                  "thermbal-mqtt");

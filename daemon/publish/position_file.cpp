@@ -1,13 +1,13 @@
 #include "publish/position_file.hpp"
 
 #include <cerrno>
-#include <cstring>
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
+#include "base/errno_text.hpp"
 #include "config/load.hpp"
 
 namespace thermbal {
@@ -22,8 +22,7 @@ std::optional<std::int64_t> integer_in(const json& document, const char* key) {
 }
 
 std::unexpected<Error> cannot_write(const std::filesystem::path& path) {
-    return fail(NextStep::retry,
-                fmt::format("{}: cannot be written: {}", path.string(), std::strerror(errno)));
+    return fail(NextStep::retry, fmt::format("{}: cannot be written: {}", path.string(), errno_text(errno)));
 }
 
 bool write_all(int fd, std::string_view text) {
@@ -71,7 +70,7 @@ std::optional<FeedPosition> position_in(std::string_view text) {
 }
 
 std::optional<FeedPosition> load_position(const std::filesystem::path& path) {
-    const auto text = read_text_file(path.string(), 64 * 1024);
+    const auto text = read_text_file(path.string(), std::size_t{64} * 1024);
     return text ? position_in(*text) : std::nullopt;
 }
 

@@ -19,7 +19,7 @@ Result<std::string> secret_path(std::string_view name, std::string_view credenti
 Result<std::string> read_secret(std::string_view name, std::string_view credentials_folder) {
     const auto path = secret_path(name, credentials_folder);
     if (!path) return path;
-    auto secret = read_text_file(*path, 64 * 1024);
+    auto secret = read_text_file(*path, std::size_t{64} * 1024);
     if (!secret) return secret;
     while (!secret->empty() && (secret->back() == '\n' || secret->back() == '\r')) secret->pop_back();
     if (secret->empty())

@@ -291,6 +291,7 @@ std::string sensor_map(const TestReport& report) {
     double most_C = 0.0;
     for (const ReportChannel& channel : report.channels) most_C = std::fmax(most_C, rise_C(report, channel));
     std::vector<const ReportChannel*> by_heat;
+    by_heat.reserve(report.channels.size());
     for (const ReportChannel& channel : report.channels) by_heat.push_back(&channel);
     std::ranges::stable_sort(by_heat, [&](const ReportChannel* a, const ReportChannel* b) {
         const double left_C = rise_C(report, *a), right_C = rise_C(report, *b);

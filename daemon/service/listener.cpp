@@ -43,6 +43,7 @@ Result<void> clear_stale(const std::filesystem::path& path) {
     if (!S_ISSOCK(file.st_mode)) return refuse(path, "is there and is no socket; name another path");
     const auto address = address_of(path);
     const Descriptor probe = stream_socket();
+    if (probe.get() < 0) return refuse(path, errno_text(errno));
     if (connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
         errno == EAGAIN)
         return refuse(path, "another daemon answers on it; stop that one, or name another path");

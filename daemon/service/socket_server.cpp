@@ -231,7 +231,7 @@ void SocketServer::Parts::serve(Client& client, std::uint32_t events) {
 }
 
 void SocketServer::Parts::receive(Client& client) {
-    std::array<char, 16 * 1024> buffer;
+    std::array<char, std::size_t{16} * 1024> buffer;
     const auto count = recv(client.socket.get(), buffer.data(), buffer.size(), 0);
     if (count > 0) {
         client.received.append(buffer.data(), static_cast<std::size_t>(count));

@@ -108,12 +108,14 @@ Sample sample_in(const sqlite::Statement& row, int first_column) {
 
 std::vector<Column> empty_columns(const std::vector<std::string>& names, std::size_t length) {
     std::vector<Column> columns;
+    columns.reserve(names.size());
     for (const auto& name : names) columns.push_back({name, std::vector<double>(length, no_value)});
     return columns;
 }
 
 std::vector<std::string> names_of(const std::vector<ChannelRecord>& channels) {
     std::vector<std::string> names;
+    names.reserve(channels.size());
     for (const auto& channel : channels) names.push_back(channel.name);
     return names;
 }

@@ -28,6 +28,7 @@ std::int64_t longest_standstill_ns(const Config& config) {
 
 std::vector<std::string> line_names(const Config& config) {
     std::vector<std::string> names;
+    names.reserve(config.lines.size());
     for (const LineConfig& line : config.lines) names.push_back(line.link.name);
     return names;
 }

@@ -39,6 +39,7 @@ std::string boot_id() {
     std::ifstream file("/proc/sys/kernel/random/boot_id");
     std::string id;
     if (std::getline(file, id) && !id.empty()) return id;
+    // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody here sets variables
     if (const char* told = std::getenv("THERMBAL_BOOT_ID"); told != nullptr && *told != '\0') return told;
     return fmt::format("unknown, process {} of {}", getpid(), system_clock()->wall_ns());
 }
@@ -63,9 +64,9 @@ void leave_signals_to_the_loop() {
     sigemptyset(&signals);
     for (const int signal : {SIGTERM, SIGINT}) sigaddset(&signals, signal);
     pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-    std::signal(SIGPIPE, SIG_IGN);
+    std::signal(SIGPIPE, SIG_IGN);  // NOLINT(concurrency-mt-unsafe): no other thread yet
     // A limit on the size of files is a failed write, not the end of the measurement.
-    std::signal(SIGXFSZ, SIG_IGN);
+    std::signal(SIGXFSZ, SIG_IGN);  // NOLINT(concurrency-mt-unsafe)
 }
 
 /// An identification takes some megabytes for a second; without this they are kept for good, and a daemon
@@ -84,6 +85,8 @@ int refused(const Error& error) {
 
 }  // namespace
 
+// What nobody expects to be thrown ends the program with what it says.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
     CLI::App app(
         "Polls a temperature module during a thermal-balance test, declares where each channel will settle, "
@@ -141,6 +144,7 @@ int main(int argc, char** argv) {
     spdlog::set_default_logger(spdlog::stderr_logger_mt("thermbald"));
     spdlog::set_level(spdlog::level::from_str(config->log.level));
     // Under systemd the journal stamps every line.
+    // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody here sets variables
     spdlog::set_pattern(std::getenv("JOURNAL_STREAM") != nullptr ? "%l: %v" : "%Y-%m-%dT%H:%M:%S.%e %l: %v");
 
     leave_signals_to_the_loop();

@@ -223,6 +223,7 @@ void Daemon::follow_grid(Grid grid, std::int64_t first_scan) {
     ++generation_;
     freeze_watch_.begin_grid();
     std::vector<std::size_t> channel_line;
+    channel_line.reserve(options_.config.channels.size());
     for (const ChannelConfig& channel : options_.config.channels) {
         channel_line.push_back(options_.config.units[channel.unit].line);
     }

@@ -25,6 +25,7 @@ std::vector<WatchedModule> watched_modules(const Config& config) {
 
 std::vector<AlarmLimit> alarm_limits(const Config& config) {
     std::vector<AlarmLimit> limits;
+    limits.reserve(config.alarms.size());
     for (const AlarmConfig& alarm : config.alarms) {
         limits.push_back({.name = alarm.name,
                           .channel = alarm.channel,

@@ -185,6 +185,8 @@ Result<void> run(const SimulatorOptions& options) {
 }  // namespace
 }  // namespace thermbal
 
+// What nobody expects to be thrown ends the program with what it says.
+// NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
     const thermbal::ParsedCommandLine command = thermbal::parse_command_line(argc, argv);
     if (!command.options) return command.exit_status;

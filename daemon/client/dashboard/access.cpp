@@ -79,7 +79,7 @@ Result<std::string> read_token(const std::string& path) {
     if ((rights & std::filesystem::perms::others_read) != std::filesystem::perms::none)
         return fail(NextStep::refuse_input, fmt::format("{}: everybody can read it; chmod 600 it", path));
     constexpr std::size_t fewest = 16;
-    const std::string token = text->substr(0, text->find('\n'));
+    std::string token = text->substr(0, text->find('\n'));
     const bool plain = std::ranges::all_of(token, [](char c) {
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
                c == '_';
