@@ -30,6 +30,7 @@ std::vector<double> warm_up(const Plant& plant, std::size_t samples) {
 std::vector<double> measured(const std::vector<double>& truth, std::mt19937_64& random) {
     std::normal_distribution<double> noise(0.0, 0.05);
     std::vector<double> values;
+    values.reserve(truth.size());
     for (const double value : truth) values.push_back(std::round((value + noise(random)) * 10.0) / 10.0);
     return values;
 }

@@ -44,6 +44,7 @@ double took_s(const std::function<void()>& call) {
 
 std::vector<std::uint16_t> words_of_request(int number, int first, int count) {
     std::vector<std::uint16_t> words;
+    words.reserve(static_cast<std::size_t>(count));
     for (int i = 0; i < count; ++i) words.push_back(static_cast<std::uint16_t>(number * 1000 + first + i));
     return words;
 }
@@ -403,6 +404,7 @@ TEST(Backoff, DoublesToTheLongestPauseWithJitter) {
 TEST(LinkTcp, PeerThatNeverAcceptsKeepsTheConnectBound) {
     // A full backlog: the kernel drops further SYNs, as a gateway with one client or a dead address does.
     const int listener = socket(AF_INET, SOCK_STREAM, 0);
+    ASSERT_GE(listener, 0);
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
@@ -413,7 +415,7 @@ TEST(LinkTcp, PeerThatNeverAcceptsKeepsTheConnectBound) {
     std::vector<int> fillers;
     for (int i = 0; i < 4; ++i) {
         fillers.push_back(socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0));
-        connect(fillers.back(), reinterpret_cast<sockaddr*>(&address), length);
+        static_cast<void>(connect(fillers.back(), reinterpret_cast<sockaddr*>(&address), length));
     }
     wait(50);
     LinkOptions options;

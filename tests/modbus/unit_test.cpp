@@ -14,6 +14,7 @@ class CountingLink final : public Link {
         calls.push_back({function, first, count});
         if (static_cast<int>(calls.size()) >= fails_at) return fail(NextStep::reopen_link, "silence");
         std::vector<std::uint16_t> words;
+        words.reserve(static_cast<std::size_t>(count));
         for (int i = 0; i < count; ++i) words.push_back(static_cast<std::uint16_t>(first + i));
         return words;
     }

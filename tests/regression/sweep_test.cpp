@@ -25,6 +25,7 @@ SweepOptions quick() {
 void in_reverse_on_three_threads(std::size_t count, const std::function<void(std::size_t)>& body) {
     std::atomic<std::size_t> taken{0};
     std::vector<std::thread> threads;
+    threads.reserve(3);
     for (int k = 0; k < 3; ++k) {
         threads.emplace_back([&] {
             for (std::size_t i = taken++; i < count; i = taken++) body(count - 1 - i);
@@ -83,8 +84,8 @@ TEST(Sweep, ALinearAutoregressionSettlesWhereItsEquationSays) {
         const double a = 0.95;
         const double rise_C = steady_state_C - 18.0;
         const auto analytic_C = [&](std::size_t k) { return steady_state_C - rise_C * std::pow(a, k); };
-        std::vector<double> window;
-        for (std::size_t k = 0; k < 40; ++k) window.push_back(analytic_C(k));  // 86 % of the way
+        std::vector<double> window(40);
+        for (std::size_t k = 0; k < window.size(); ++k) window[k] = analytic_C(k);  // 86 % of the way
         SweepOptions options;
         options.epsilon = 1e-5;
         options.solver = SvrSolver::libsvm;

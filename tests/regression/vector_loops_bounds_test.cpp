@@ -49,8 +49,8 @@ TEST(VectorLoops, ReadAndWriteNothingBeyondTheirArrays) {
             std::iota(all.begin(), all.end(), std::ptrdiff_t{0});
             vector_loops::multiply_rows(matrix.data(), rows, all, weight.data(), 0.5, lags.data());
             vector_loops::add_rows(matrix.data(), rows, all, {lags.data(), count}, column.data());
-            std::vector<const double*> lagged;
-            for (std::size_t l = 0; l < count; ++l) lagged.push_back(matrix.data() + l * rows);
+            std::vector<const double*> lagged(count);
+            for (std::size_t l = 0; l < count; ++l) lagged[l] = matrix.data() + l * rows;
             vector_loops::subtract_columns(lagged.data(), rows, count, lags.data(), column.data());
             vector_loops::squared_distances_to(lagged.data(), rows, lags.data(), count, column.data());
             (void)vector_loops::weighted_gaussians(matrix.data(), rows, weight.data(), lags.data(), count,
