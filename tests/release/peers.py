@@ -1,10 +1,12 @@
 #!/usr/bin/python3
 """thermbald beside the daemons that it is held against, from the units and programs of their Debian packages (from the mirror
-that /etc/apt names; nothing is installed): exposure, what systemd knows of their state, as whom they run, compiler hardening. telegraf
-and mbusd are no packages of Debian 12. Prints the rows of a Markdown table.
+that /etc/apt names; nothing is installed): exposure, what systemd knows of their state, as whom they run, compiler hardening. Prints
+the rows of a Markdown table. telegraf and mbusd are no packages of Debian 12: give the units of their sources
+(scripts/telegraf.service; systemd-units/mbusd@.service.in with its paths filled in).
 
-    THERMBAL_BIN_DIR=build/release/bin tests/release/peers.py
+    THERMBAL_BIN_DIR=build/release/bin tests/release/peers.py [FURTHER.service ...]
 """
+import argparse
 import pathlib
 import re
 import subprocess
@@ -32,10 +34,11 @@ def settings(unit_file):
 
 def row(name, unit_file, program):
     unit = settings(unit_file)
-    lacks = [what for what, there in findings(program).items() if not there]
+    lacks = [what for what, there in findings(program).items() if not there] if program else []
+    hardening = "not judged: no program" if program is None else "lacks " + ", ".join(lacks) if lacks else "all"
     return [name, exposure(unit_file), unit.get("Type", "simple"),
             f"{unit['WatchdogSec']} s" if "WatchdogSec" in unit else "none",
-            unit.get("User", "root"), unit.get("Restart", "no"), "all" if not lacks else "lacks " + ", ".join(lacks)]
+            unit.get("User", "root"), unit.get("Restart", "no"), hardening]
 
 
 def unpacked(package, folder):
@@ -47,12 +50,16 @@ def unpacked(package, folder):
 
 
 def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("units", nargs="*", metavar="FURTHER.service", type=pathlib.Path)
+    arguments = parser.parse_args()
     rows = [row("thermbald", BIN.parent / "systemd/units/thermbald.service", BIN / "thermbald")]
     with tempfile.TemporaryDirectory(prefix="thermbal-") as folder:
         for unit, (package, program) in PEERS.items():
             name, root = unpacked(package, folder)
             unit_file = next(root.rglob(f"systemd/system/{unit}.service"))
             rows.append(row(name, unit_file, root / program))
+    rows += [row(unit_file.stem, unit_file, None) for unit_file in arguments.units]
     for cells in [["", "exposure", "readiness", "watchdog", "starts as", "restart", "hardening"], ["---"] * 7, *rows]:
         print("| " + " | ".join(cells) + " |")
 
