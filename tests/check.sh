@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Checks beyond the tests: tests/check.sh CHECK ...
 #   style        clang-format on every source
-#   tidy         clang-tidy on every source (about 15 min on 2 cores; what passed once is remembered)
+#   tidy         clang-tidy on every source (about 40 min of processor, estimated; what passed once is remembered)
 #   tidy-changed clang-tidy on what differs from the commit before, or from $THERMBAL_BASE
 #   clang        the programs by clang
 #   asan         the C++ tests of what bytes from outside reach, under AddressSanitizer and UndefinedBehaviorSanitizer
