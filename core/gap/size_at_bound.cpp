@@ -1,5 +1,6 @@
 #include "size_at_bound.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -44,9 +45,10 @@ Result<Explanation> with_expected_sizes(const Evidence& evidence, const Explanat
         const double at = fit.point.coordinates(k);
         if (!is_one_sided_size(parameter) || parameter.effect < known) continue;
         const double variance = hessian.solve(Eigen::VectorXd::Unit(free.size(), k))(k);
+        if (!(variance > 0.0) || !std::isfinite(variance)) continue;
         const double sigma = std::sqrt(variance);
         if (at > parameter.lower + far_from_bound * sigma) continue;
-        const double size = mean_above(parameter.lower, free(k), sigma);
+        const double size = std::min(mean_above(parameter.lower, free(k), sigma), parameter.upper);
         for (EffectParameter& number : expected.effects[parameter.effect - known].parameters) {
             if (number.name != parameter.short_name()) continue;
             number.value = size;
