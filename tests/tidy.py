@@ -63,7 +63,8 @@ def judged(entry, settings, build):
     passed = PASSED / key_of(entry, settings)
     if passed.exists():
         return entry["file"], "", True
-    done = subprocess.run([TIDY, "-p", build, "--quiet", "--checks=-bugprone-suspicious-include", entry["file"]], capture_output=True, text=True, check=False)
+    done = subprocess.run([TIDY, "-p", build, "--quiet", "--checks=-bugprone-suspicious-include", entry["file"]],
+                          capture_output=True, text=True, check=False)
     if done.returncode == 0 and "warning:" not in done.stdout:
         passed.touch()
         return entry["file"], "", False

@@ -59,6 +59,9 @@ struct Contender {
     Candidate candidate;
     Explanation explanation;
     double log_bayes_factor = 0.0;  ///< over the explanation that it extends
+
+    /// The same by the run alone, the held-out runs left out.
+    double on_the_run() const { return log_bayes_factor - explanation.log_prediction; }
 };
 
 /// What might be missing from an explanation.

@@ -109,14 +109,14 @@ class Slope {
 };
 
 /// A step that makes the fit better, and by how much of chi2 the sensitivities promised.
-struct Step {
+struct Improvement {
     FitPoint point;
     double promised;
 };
 
 /// Damped until it does; none where no step promises anything. Leaves in `damping` where the next begins.
-std::optional<Step> better_step(const FitProblem& problem, const Slope& slope, const FitPoint& from,
-                                double& damping, double chi2_tolerance) {
+std::optional<Improvement> better_step(const FitProblem& problem, const Slope& slope, const FitPoint& from,
+                                       double& damping, double chi2_tolerance) {
     const Eigen::VectorXd lower = problem.lower(), upper = problem.upper();
     const Eigen::VectorXd gradient = slope.jacobian().transpose() * from.residual;
     for (int attempt = 0; attempt < 8; ++attempt) {
@@ -126,7 +126,7 @@ std::optional<Step> better_step(const FitProblem& problem, const Slope& slope, c
         auto next = problem.evaluate(from.coordinates + step);
         if (next && next->chi2 < from.chi2) {
             damping = std::max(damping * 0.1, 1e-9);
-            return Step{std::move(*next), promised};
+            return Improvement{std::move(*next), promised};
         }
         if (promised < chi2_tolerance) return {};
         damping = std::max(damping, 1e-4) * 8.0;
@@ -153,11 +153,11 @@ Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const Cal
         // Sensitivities cost as much as all coordinates together, a step one simulation: as long as they
         // promise about what happens, further steps are taken with them.
         for (int steps = 0; steps < most_steps_at_once; ++steps) {
-            const auto step = better_step(problem, slope, fit.point, damping, options.chi2_tolerance);
+            auto step = better_step(problem, slope, fit.point, damping, options.chi2_tolerance);
             const double gained = step ? fit.point.chi2 - step->point.chi2 : 0.0;
             if (steps == 0) fit.converged = gained < options.chi2_tolerance;
             if (!step) break;
-            fit.point = step->point;
+            fit.point = std::move(step->point);
             if (gained < options.chi2_tolerance || gained < 0.5 * step->promised) break;
         }
         if (fit.converged) break;

@@ -33,11 +33,16 @@ double doubt_of_sensor(const Contender& contender, const Survey& survey, const M
     return std::max(0.0, machine - evidence_at(survey, true, contender.candidate.at));
 }
 
+double evidence_for(const Contender& contender, const OddsOptions& options) {
+    return options.forecasts_count ? contender.log_bayes_factor : contender.on_the_run();
+}
+
 /// Something without a name forecasts nothing, but a name must not win by forecasting roughly right what it
 /// does not describe well: on the run itself it has to be as good as the nameless. So the nameless gets what
 /// the best forecast gains.
-double forecast_credit(const Survey& survey) {
+double forecast_credit(const Survey& survey, const OddsOptions& options) {
     double credit = 0.0;
+    if (!options.forecasts_count) return credit;
     for (const Contender& contender : survey.contenders) {
         credit = std::max(credit, contender.explanation.log_prediction);
     }
@@ -50,11 +55,11 @@ Odds odds_of(const Survey& survey, const Model& model, const OddsOptions& option
     double largest = std::log(options.nothing_missing);
     std::vector<double> named, nameless;
     for (const Contender& contender : survey.contenders) {
-        named.push_back(contender.log_bayes_factor + log_prior(contender.candidate, model, options) -
+        named.push_back(evidence_for(contender, options) + log_prior(contender.candidate, model, options) -
                         doubt_of_sensor(contender, survey, model));
         largest = std::max(largest, named.back());
     }
-    const double credit = forecast_credit(survey);
+    const double credit = forecast_credit(survey, options);
     for (const Nameless& one : survey.nameless) {
         const double worth = one.log_bayes_factor > 0.0
                                  ? options.nameless_discount * one.log_bayes_factor + credit
@@ -77,7 +82,7 @@ Odds odds_of(const Survey& survey, const Model& model, const OddsOptions& option
             continue;
         }
         odds.kinds.push_back(
-            {candidate.definition->kind, candidate.at, weight, survey.contenders[i].log_bayes_factor});
+            {candidate.definition->kind, candidate.at, weight, evidence_for(survey.contenders[i], options)});
         odds.best_of.push_back(i);
     }
     odds.nothing /= total;

@@ -14,6 +14,7 @@ struct OddsOptions {
     /// The nameless explanation also dresses up the model's own limits, which grow with the effect: it has to
     /// be better than the named one by this much before the name is doubted.
     double nameless_discount = 0.9;
+    bool forecasts_count = true;  ///< else by the run alone
 };
 
 /// Probabilities of what is missing next.

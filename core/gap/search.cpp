@@ -25,19 +25,10 @@ Support support_of(const Survey& survey, const Odds& odds) {
     for (const Suspect& suspect : odds.kinds) named += suspect.probability;
     if (named > 0.5 && odds.kinds.front().probability > odds.nameless) return Support::name;
     const Contender& best = best_of(survey, odds);
-    const double on_the_run = best.log_bayes_factor - best.explanation.log_prediction;
-    return on_the_run > least_share_of_a_relative * survey.nameless.front().log_bayes_factor &&
-                   on_the_run > 5.0
+    return best.on_the_run() > least_share_of_a_relative * survey.nameless.front().log_bayes_factor &&
+                   best.on_the_run() > 5.0
                ? Support::relative
                : Support::none;
-}
-
-Survey without_forecasts(Survey survey) {
-    for (Contender& contender : survey.contenders) {
-        contender.log_bayes_factor -= contender.explanation.log_prediction;
-        contender.explanation.log_prediction = 0.0;
-    }
-    return survey;
 }
 
 /// What is taken next, and the odds that say so.
@@ -54,9 +45,8 @@ Choice choose(const Survey& survey, const Model& model) {
     Odds odds = odds_of(survey, model);
     const Support support = support_of(survey, odds);
     if (support != Support::none || !odds.something_is_missing()) return {support, std::move(odds)};
-    const Survey of_the_run = without_forecasts(survey);
-    Odds by_the_run = odds_of(of_the_run, model);
-    if (support_of(of_the_run, by_the_run) != Support::name ||
+    Odds by_the_run = odds_of(survey, model, {.forecasts_count = false});
+    if (support_of(survey, by_the_run) != Support::name ||
         best_of(survey, by_the_run).explanation.log_prediction < 0.0)
         return {support, std::move(odds)};
     return {Support::relative, std::move(by_the_run)};

@@ -290,8 +290,8 @@ Result<void> Integrator::run(const Eigen::VectorXd& initial_C, std::span<const d
     std::size_t regime = 0;
     auto sample = sample_times_s.begin();
     node_C_ = initial_C;
-    enter_regime(regime);
     if (is_exact_throughout()) return run_exact(sample_times_s, moments, at_sample);
+    enter_regime(regime);
     heat_.begin_step(moments.front(), moments.front());
     sensors_.begin(moments.front(), node_C_, heat_.ambient_C(moments.front()));
     switch_thermostats(moments.front());

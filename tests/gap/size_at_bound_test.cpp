@@ -34,17 +34,26 @@ TEST(MeanAbove, GoesOnFarBeyondTheBound) {
     EXPECT_GT(mean_above(0.0, -1e6, 1.0), 0.0);
 }
 
-/// Friction that falls as it warms is the opposite of friction that grows: a fit of that stops at none.
-TEST(ExpectedSize, IsMoreThanNoneWhereTheFitStoppedAtNone) {
+/// A run of the small machine with this effect, for the machine without it.
+Evidence evidence_of(const Effect& effect) {
     Model truth = small_machine();
-    truth.effects.push_back({"friction_viscosity", "", "bearing", {{"beta_per_K", 0.01, 0.0}}, {}});
-    const CalibrationOptions options;
+    truth.effects.push_back(effect);
     Evidence evidence;
     evidence.prior_model = small_machine();
-    evidence.run = make_fit_data(small_machine(), measured_on(truth, 300.0, 0.05, 3), options).value();
+    evidence.run = make_fit_data(small_machine(), measured_on(truth, 300.0, 0.05, 3), {}).value();
     evidence.parallel_for = sequential_for;
-    const auto fitted =
-        explain(evidence, {{"preload_growth", "", "bearing", {{"growth_per_K", 0.03, 0.0}}, {}}}, nullptr);
+    return evidence;
+}
+
+Effect preload(double growth_per_K) {
+    return {"preload_growth", "", "bearing", {{"growth_per_K", growth_per_K, 0.0}}, {}};
+}
+
+/// Friction that falls as it warms is the opposite of friction that grows: a fit of that stops at none.
+TEST(ExpectedSize, IsMoreThanNoneWhereTheFitStoppedAtNone) {
+    const Evidence evidence =
+        evidence_of({"friction_viscosity", "", "bearing", {{"beta_per_K", 0.01, 0.0}}, {}});
+    const auto fitted = explain(evidence, {preload(0.03)}, nullptr);
     ASSERT_TRUE(fitted.has_value());
     ASSERT_EQ(fitted->fit.model.effects[0].parameter("growth_per_K"), 0.0);
     const auto expected = with_expected_sizes(evidence, *fitted);
@@ -55,14 +64,8 @@ TEST(ExpectedSize, IsMoreThanNoneWhereTheFitStoppedAtNone) {
 
 /// Just above its bound a size is as little known as at it.
 TEST(ExpectedSize, IsMoreThanTheLikeliestNearTheBound) {
-    Model truth = small_machine();
-    truth.effects.push_back({"preload_growth", "", "bearing", {{"growth_per_K", 0.0005, 0.0}}, {}});
-    Evidence evidence;
-    evidence.prior_model = small_machine();
-    evidence.run = make_fit_data(small_machine(), measured_on(truth, 300.0, 0.05, 3), {}).value();
-    evidence.parallel_for = sequential_for;
-    const auto fitted =
-        explain(evidence, {{"preload_growth", "", "bearing", {{"growth_per_K", 0.03, 0.0}}, {}}}, nullptr);
+    const Evidence evidence = evidence_of(preload(0.0005));
+    const auto fitted = explain(evidence, {preload(0.03)}, nullptr);
     ASSERT_TRUE(fitted.has_value());
     const double likeliest = fitted->fit.model.effects[0].parameter("growth_per_K");
     ASSERT_GT(likeliest, 0.0);
@@ -73,14 +76,8 @@ TEST(ExpectedSize, IsMoreThanTheLikeliestNearTheBound) {
 }
 
 TEST(ExpectedSize, IsTheFittedOneElsewhere) {
-    Model truth = small_machine();
-    truth.effects.push_back({"preload_growth", "", "bearing", {{"growth_per_K", 0.05, 0.0}}, {}});
-    Evidence evidence;
-    evidence.prior_model = small_machine();
-    evidence.run = make_fit_data(small_machine(), measured_on(truth, 300.0, 0.05, 3), {}).value();
-    evidence.parallel_for = sequential_for;
-    const auto fitted =
-        explain(evidence, {{"preload_growth", "", "bearing", {{"growth_per_K", 0.03, 0.0}}, {}}}, nullptr);
+    const Evidence evidence = evidence_of(preload(0.05));
+    const auto fitted = explain(evidence, {preload(0.03)}, nullptr);
     ASSERT_TRUE(fitted.has_value());
     const auto expected = with_expected_sizes(evidence, *fitted);
     ASSERT_TRUE(expected.has_value());
