@@ -5,8 +5,9 @@ WAL and database over the time, as figures and as a plot.
 
     THERMBAL_BIN_DIR=build/release/bin THERMBAL_SOURCE_DIR=. tests/faults/month.py [--days 30] [--plot month.svg]
 
-A scan that is due every 15 s is due every 15 s / --speed here (0.25 s; 30 days take 12 h). Ends with 1 when a value that is
-stored as good is none that the module measured during that scan, a scan has no row, or something has grown that should not.
+A scan that is due every 15 s is due every 15 s / --speed here (0.25 s, less does not fit the line's timeouts; 30 days take 12 h).
+--speed 300 --period-s 75 --identify-every-h 24 takes 2.4 h. Ends with 1 when a value that is stored as good is none that the
+module measured during that scan, a scan has no row, or something has grown that should not.
 """
 import argparse
 import json
@@ -123,7 +124,7 @@ def growth(seen):
             for key in ("memory_MiB", "descriptors", "wal_MiB")}
 
 
-def plot(path, seen):
+def plot(path, seen, period_s):
     """Four curves over the days, as SVG."""
     width, height, left = 720, 130, 70
     parts = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{width + left + 20}" height="{4 * height + 40}" '
@@ -138,7 +139,7 @@ def plot(path, seen):
         parts += [f'<text x="4" y="{top + 10}">{name}</text>', f'<text x="4" y="{top + 24}">0 to {most:.1f}</text>',
                   f'<path d="M{left},{top} V{top + height - 30} H{left + width}" fill="none" stroke="#999"/>',
                   f'<polyline points="{points}" fill="none" stroke="#1f5fa8" stroke-width="1"/>']
-    parts.append(f'<text x="{left}" y="{4 * height + 20}">0 to {days:.1f} days, one scan every 15 s</text></svg>')
+    parts.append(f'<text x="{left}" y="{4 * height + 20}">0 to {days:.1f} days, one scan every {period_s:g} s</text></svg>')
     pathlib.Path(path).write_text("\n".join(parts), encoding="utf-8")
 
 
@@ -146,6 +147,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--days", type=float, default=30.0)
     parser.add_argument("--speed", type=float, default=60.0, help="15 s of the month in 15 s / SPEED")
+    parser.add_argument("--period-s", type=float, default=15.0, help="from scan to scan, of the month")
+    parser.add_argument("--identify-every-h", type=float, default=1.0, help="of the month; at high speed one takes longer than that")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--plot", default="month.svg")
     parser.add_argument("--library", default=str(BIN.parent / "tests" / "libclock_step.so"), help=argparse.SUPPRESS)
@@ -158,13 +161,13 @@ def main():
             line = {"transport": "tcp", "host": "127.0.0.1", "port": sim.port, "connect_timeout_ms": 10,
                     "response_timeout_ms": TIMEOUT_S * 1e3, "reconnect_pause_ms": 5}
             config = configuration(folder, line, units=((1, 8), (2, 8)), profile="generic-8x-int16",
-                                   test={"period_s": 15.0 / arguments.speed},
-                                   identification={"every_s": 3600.0 / arguments.speed, "workers": 1})
+                                   test={"period_s": arguments.period_s / arguments.speed},
+                                   identification={"every_s": arguments.identify_every_h * 3600.0 / arguments.speed, "workers": 1})
             with SteppedDaemon(folder, config, arguments.library) as daemon:
                 seen, happened = live(daemon, folder, arguments.days, arguments.speed, arguments.seed)
             sim.stop()
         figures = check_scans(folder, measured(f"{folder}/truth.csv"), epoch_ns, arguments.speed)
-    plot(arguments.plot, seen)
+    plot(arguments.plot, seen, arguments.period_s)
     grown = growth(seen)
     most = {key: round(max(one[key] for one in seen), 2) for key in seen[0]}
     print(json.dumps({"happened": happened, "checked": figures, "most": most,
