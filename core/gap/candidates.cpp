@@ -16,7 +16,7 @@ std::vector<Candidate> all_candidates(const Model& model, const std::vector<std:
     std::vector<Candidate> candidates;
     for (const EffectDefinition& definition : effect_catalogue()) {
         for (const EffectForm& form : definition.forms) {
-            if (form.steers_itself) continue;  // screen_thermostats
+            if (form.steers_itself || form.refines_first) continue;
             const auto places = form.site == EffectSite::column ? columns : possible_places(form, model);
             for (const std::string& at : places) {
                 if (!is_there_already(model, definition.kind, at))
@@ -25,6 +25,21 @@ std::vector<Candidate> all_candidates(const Model& model, const std::vector<std:
         }
     }
     return candidates;
+}
+
+std::vector<Screened> refined(const Screened& first, const Model& model) {
+    std::vector<Screened> found;
+    const EffectDefinition& definition = *first.candidate.definition;
+    for (const EffectForm& form : definition.forms) {
+        if (!form.refines_first || first.candidate.form != &definition.forms.front()) continue;
+        Screened one{{&definition, &form, first.candidate.at},
+                     make_effect(definition, form, first.candidate.at, model),
+                     first.log_likelihood_gain};
+        for (const auto& parameter : first.start.parameters)
+            one.start.set_parameter(parameter.name, parameter.value);
+        found.push_back(std::move(one));
+    }
+    return found;
 }
 
 }  // namespace thermbal

@@ -137,8 +137,9 @@ Result<std::vector<FoundEffect>> describe_effects(const Evidence& evidence, cons
         found.push_back(std::move(one));
         before = std::move(after);
     }
-    std::ranges::stable_sort(found, std::ranges::greater{},
-                             [](const FoundEffect& one) { return one.rmse_before_C - one.rmse_after_C; });
+    std::ranges::stable_sort(found, std::ranges::greater{}, [](const FoundEffect& one) {
+        return std::pair{one.probability > relative_high, one.rmse_before_C - one.rmse_after_C};
+    });
     return found;
 }
 

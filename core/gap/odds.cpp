@@ -34,19 +34,30 @@ double doubt_of_sensor(const Contender& contender, const Survey& survey, const M
 }
 
 double evidence_for(const Contender& contender, const OddsOptions& options) {
-    return options.forecasts_count ? contender.log_bayes_factor : contender.on_the_run();
+    return contender.on_the_run() + options.forecast_weight * contender.explanation.log_prediction;
+}
+
+/// Whether the two may be one cause: at one node or at neighbours, or the name acts everywhere.
+bool may_be_the_same(const Contender& named, const Nameless& nameless, const Model& model) {
+    const std::string node = node_of_place(named.candidate.form->site, named.candidate.at, model);
+    if (node.empty()) return true;
+    const std::string other =
+        nameless.of_sensor ? node_of_place(EffectSite::channel, nameless.at, model) : nameless.at;
+    const std::vector<std::string> around = neighbours(model, node);
+    return node == other || std::ranges::find(around, other) != around.end();
 }
 
 /// Something without a name forecasts nothing, but a name must not win by forecasting roughly right what it
-/// does not describe well: on the run itself it has to be as good as the nameless. So the nameless gets what
-/// the best forecast gains.
-double forecast_credit(const Survey& survey, const OddsOptions& options) {
+/// does not describe well: on the run itself it has to be as good as the nameless there. So the nameless gets
+/// what the best forecast gains of the names that it may stand for.
+double forecast_credit(const Nameless& nameless, const Survey& survey, const Model& model,
+                       const OddsOptions& options) {
     double credit = 0.0;
-    if (!options.forecasts_count) return credit;
     for (const Contender& contender : survey.contenders) {
-        credit = std::max(credit, contender.explanation.log_prediction);
+        if (contender.explanation.log_prediction > credit && may_be_the_same(contender, nameless, model))
+            credit = contender.explanation.log_prediction;
     }
-    return credit;
+    return options.forecast_weight * credit;
 }
 
 }  // namespace
@@ -59,11 +70,10 @@ Odds odds_of(const Survey& survey, const Model& model, const OddsOptions& option
                         doubt_of_sensor(contender, survey, model));
         largest = std::max(largest, named.back());
     }
-    const double credit = forecast_credit(survey, options);
     for (const Nameless& one : survey.nameless) {
-        const double worth = one.log_bayes_factor > 0.0
-                                 ? options.nameless_discount * one.log_bayes_factor + credit
-                                 : one.log_bayes_factor;
+        const double worth = one.log_bayes_factor > 0.0 ? options.nameless_discount * one.log_bayes_factor +
+                                                              forecast_credit(one, survey, model, options)
+                                                        : one.log_bayes_factor;
         nameless.push_back(worth + std::log(options.nameless / static_cast<double>(survey.nameless.size())));
         largest = std::max(largest, nameless.back());
     }
@@ -79,6 +89,12 @@ Odds odds_of(const Survey& survey, const Model& model, const OddsOptions& option
         const auto known = std::ranges::find(odds.kinds, candidate.definition->kind, &Suspect::kind);
         if (known != odds.kinds.end()) {
             known->probability += weight;
+            std::size_t& best = odds.best_of[static_cast<std::size_t>(known - odds.kinds.begin())];
+            if (named[i] > named[best]) {
+                best = i;
+                known->at = candidate.at;
+                known->log_bayes_factor = evidence_for(survey.contenders[i], options);
+            }
             continue;
         }
         odds.kinds.push_back(

@@ -5,68 +5,22 @@
 #include <numeric>
 #include <string>
 
+#include "choice.hpp"
 #include "thermostats.hpp"
 
 namespace thermbal {
 namespace {
 
-/// What speaks for a next effect: nothing; the nearest relative of something without a name; a name.
-enum class Support { none, relative, name };
-
-constexpr double least_share_of_a_relative = 0.5;
-
-const Contender& best_of(const Survey& survey, const Odds& odds) {
-    return survey.contenders[odds.best_of.front()];
-}
-
-Support support_of(const Survey& survey, const Odds& odds) {
-    if (!odds.something_is_missing() || odds.kinds.empty()) return Support::none;
-    double named = 0.0;
-    for (const Suspect& suspect : odds.kinds) named += suspect.probability;
-    if (named > 0.5 && odds.kinds.front().probability > odds.nameless) return Support::name;
-    const Contender& best = best_of(survey, odds);
-    return best.on_the_run() > least_share_of_a_relative * survey.nameless.front().log_bayes_factor &&
-                   best.on_the_run() > 5.0
-               ? Support::relative
-               : Support::none;
-}
-
-/// What is taken next, and the odds that say so.
-struct Choice {
-    Support support;
-    Odds odds;
-};
-
-/// Where two effects are missing, one may forecast best without describing the run, and the other describe
-/// the run. The nameless, which has the forecast of the one, then beats both. What describes the run by
-/// itself better than the nameless, and forecasts no worse than nothing, is taken in doubt: the doubt is
-/// lifted when the other completes the picture.
-Choice choose(const Survey& survey, const Model& model) {
-    Odds odds = odds_of(survey, model);
-    const Support support = support_of(survey, odds);
-    if (support != Support::none || !odds.something_is_missing()) return {support, std::move(odds)};
-    Odds by_the_run = odds_of(survey, model, {.forecasts_count = false});
-    if (support_of(survey, by_the_run) != Support::name ||
-        best_of(survey, by_the_run).explanation.log_prediction < 0.0)
-        return {support, std::move(odds)};
-    return {Support::relative, std::move(by_the_run)};
-}
-
-/// The node where an effect shows: a channel's is the one that its sensor sits on; empty where it acts
-/// everywhere.
-std::string node_of(const Effect& effect, const Model& model) {
-    const auto sensor = find_sensor(model, effect.at);
-    const bool of_channel = form_of(effect).site == EffectSite::channel;
-    return of_channel && sensor ? model.sensors[*sensor].node : effect.at;
-}
-
 /// Two names at one node, or two that set in at the same moment, are one cause that the catalogue does not
 /// have, dressed up.
 bool is_dressing_up(const Effect& one, const Effect& other, const Model& model) {
     constexpr double same_moment_s = 600.0;
-    const std::string node = node_of(one, model);
+    const auto node_of = [&](const Effect& effect) {
+        return node_of_place(form_of(effect).site, effect.at, model);
+    };
+    const std::string node = node_of(one);
     const auto from_s = onset_of(one), other_from_s = onset_of(other);
-    return (!node.empty() && node == node_of(other, model)) ||
+    return (!node.empty() && node == node_of(other)) ||
            (from_s && other_from_s && std::abs(*from_s - *other_from_s) < same_moment_s);
 }
 

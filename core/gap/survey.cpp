@@ -26,6 +26,8 @@ std::vector<Screened> screen_all(const Evidence& evidence, const Explanation& cu
     std::vector<Screened> screened(candidates.size());
     evidence.parallel_for(candidates.size(),
                           [&](std::size_t i) { screened[i] = screen(candidates[i], ground, timing); });
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+        std::ranges::move(refined(screened[i], current.fit.model), std::back_inserter(screened));
     std::ranges::move(screen_thermostats(evidence, current, nameless), std::back_inserter(screened));
     std::ranges::sort(screened, std::ranges::greater{}, &Screened::log_likelihood_gain);
     return screened;

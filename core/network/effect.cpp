@@ -82,6 +82,22 @@ const EffectDefinition* find_effect(std::string_view kind) {
     return found == effect_catalogue().end() ? nullptr : &*found;
 }
 
+std::string node_of_place(EffectSite site, std::string_view at, const Model& model) {
+    switch (site) {
+        case EffectSite::node:
+        case EffectSite::ambient_link:
+            return std::string(at);
+        case EffectSite::source:
+            return model.sources[*find_source(model, at)].node;
+        case EffectSite::channel:
+            return model.sensors[*find_sensor(model, at)].node;
+        case EffectSite::whole_model:
+        case EffectSite::column:
+            break;
+    }
+    return "";
+}
+
 ResolvedPrior resolve_prior(const EffectParameterDefinition& parameter, const Model& model) {
     const double unit = prior_unit(parameter.prior_unit, model);
     return {.lower = parameter.lower * unit,

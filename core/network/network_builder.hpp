@@ -54,11 +54,13 @@ struct ReadingTerm {
     std::size_t sensor;
     std::function<double(double time_s)> added_C;
 };
-/// From from_s on the sensor measures a share of the ambient.
+/// From from_s on the sensor measures a share of the ambient, to which it goes over with a time constant;
+/// zero: at once.
 struct Detachment {
     std::size_t sensor;
     double ambient_share;
     double from_s;
+    double time_constant_s = 0.0;
 };
 
 struct CompiledLink {

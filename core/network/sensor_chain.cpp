@@ -1,6 +1,7 @@
 #include "sensor_chain.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "phi.hpp"
 
@@ -43,7 +44,10 @@ SensorChain::SensorChain(const CompiledNetwork& network)
 double SensorChain::ambient_share(std::size_t sensor, double time_s) const {
     double share = 0.0;
     for (const Detachment& detachment : network_.detachments) {
-        if (detachment.sensor == sensor && detachment.from_s <= time_s) share = detachment.ambient_share;
+        if (detachment.sensor != sensor || detachment.from_s > time_s) continue;
+        share = detachment.ambient_share;
+        if (detachment.time_constant_s > 0.0)
+            share *= -std::expm1(-(time_s - detachment.from_s) / detachment.time_constant_s);
     }
     return share;
 }

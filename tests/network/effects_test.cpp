@@ -31,6 +31,11 @@ std::vector<Effect> one_of_each() {
          {{"power_W", 260.0}, {"switch_on_C", 22.0}, {"hysteresis_C", 0.6}},
          {}},
         {"friction_viscosity", "", "bearing", {{"beta_per_K", 0.03}, {"reference_C", 22.0}}, {}},
+        {"friction_viscosity",
+         "viscous_share",
+         "bearing",
+         {{"viscous_share", 0.7}, {"reference_C", 22.0}},
+         {}},
         {"preload_growth", "", "bearing", {{"growth_per_K", 0.08}}, {}},
         {"preload_growth", "to_first_neighbour", "bearing", {{"growth_per_K", 0.07}}, {}},
         {"preload_growth", "to_second_neighbour", "bearing", {{"growth_per_K", 0.06}}, {}},
@@ -50,6 +55,11 @@ std::vector<Effect> one_of_each() {
         {"sensor_offset", "", "T3", {{"offset_C", -1.3}}, {}},
         {"sensor_drift", "", "T4", {{"rate_C_per_h", 0.9}}, {}},
         {"sensor_detached", "", "T2", {{"ambient_share", 0.45}, {"onset_s", 1111.0}}, {}},
+        {"sensor_detached",
+         "gradual",
+         "T2",
+         {{"ambient_share", 0.45}, {"onset_s", 1111.0}, {"time_constant_s", 170.0}},
+         {}},
     };
 }
 
@@ -153,6 +163,15 @@ TEST(Catalogue, HasTheFifteenKindsEachWithAllThatAPersonHasToKnow) {
         }
     }
     EXPECT_THAT(found, ::testing::ContainerEq(kinds));
+}
+
+TEST(Catalogue, AnEffectShowsAtTheNodeOfItsSourceOrSensor) {
+    Model model = spindle_head();
+    model.sources.front().name = "friction";
+    EXPECT_EQ(node_of_place(EffectSite::source, "friction", model), model.sources.front().node);
+    EXPECT_EQ(node_of_place(EffectSite::channel, "T2", model), model.sensors[*find_sensor(model, "T2")].node);
+    EXPECT_EQ(node_of_place(EffectSite::ambient_link, "housing", model), "housing");
+    EXPECT_EQ(node_of_place(EffectSite::whole_model, "", model), "");
 }
 
 TEST(Catalogue, PriorsLieInsideTheirBoundsAndMakeAValidEffect) {

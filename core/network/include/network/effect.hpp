@@ -62,6 +62,8 @@ struct EffectForm {
     std::vector<EffectParameterDefinition> parameters;  ///< the first is the one that sizes the effect
     /// When it acts follows from the temperatures: it is no multiple of one shape, and it jumps.
     bool steers_itself = false;
+    /// The first form with further parameters: what describes best in that one describes nearly best in this.
+    bool refines_first = false;
 };
 
 /// An effect with everything resolved: what its physics works on. values[i] belongs to parameters[i] of the
@@ -100,6 +102,10 @@ const EffectDefinition* find_effect(std::string_view kind);
 const EffectForm& form_of(const Effect& effect);
 /// When an effect sets in; none where it always acts. REQUIRES: as form_of.
 std::optional<double> onset_of(const Effect& effect);
+
+/// The node where an effect at this place shows: a channel's is the one that its sensor sits on; empty where
+/// it acts everywhere. REQUIRES: the place is one of the model.
+std::string node_of_place(EffectSite site, std::string_view at, const Model& model);
 
 /// A parameter's bounds and prior in its own unit, for one model.
 struct ResolvedPrior {
