@@ -83,13 +83,16 @@ void withdraw_what_closes_no_gap(Diagnosis& diagnosis) {
         places.push_back(fmt::format("{} at {}", found.effect.kind, found.at));
     }
     diagnosis.suspects.insert(diagnosis.suspects.begin(), withdrawn.begin(), withdrawn.end());
+    const bool left_something = diagnosis.verdict == GapVerdict::partly_explained;
     diagnosis.effects.clear();
-    diagnosis.disagreements.clear();
-    diagnosis.residual_heat.clear();
     diagnosis.extended = diagnosis.calibrated;
-    diagnosis.verdict = GapVerdict::agrees;
-    diagnosis.reason = fmt::format("what was found describes no run better, so that it is not named: {}",
-                                   fmt::join(places, ", "));
+    diagnosis.verdict = left_something ? GapVerdict::unexplained : GapVerdict::agrees;
+    if (!left_something) {
+        diagnosis.disagreements.clear();
+        diagnosis.residual_heat.clear();
+    }
+    diagnosis.reason = fmt::format("{}what was found describes no run better, so that it is not named: {}",
+                                   left_something ? "something is missing; " : "", fmt::join(places, ", "));
     forget_effects(diagnosis.run);
     for (RunComparison& held : diagnosis.holdouts) forget_effects(held);
 }

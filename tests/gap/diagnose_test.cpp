@@ -175,9 +175,11 @@ RunComparison compared(double before_C, double after_C) {
     return run;
 }
 
-Diagnosis withdrawn_if_useless(double after_C, const RunComparison& held) {
+Diagnosis withdrawn_if_useless(double after_C, const RunComparison& held,
+                               GapVerdict verdict = GapVerdict::explained) {
     Diagnosis diagnosis;
-    diagnosis.verdict = GapVerdict::explained;
+    diagnosis.verdict = verdict;
+    diagnosis.disagreements.resize(1);
     diagnosis.effects.emplace_back().effect.kind = "sensor_lag";
     diagnosis.run = compared(0.05, after_C);
     diagnosis.holdouts = {held};
@@ -189,6 +191,7 @@ TEST(Diagnose, AnEffectIsNotNamedToFillAGapThatItDoesNotClose) {
     const Diagnosis useless = withdrawn_if_useless(0.0495, compared(0.05, 0.051));
     EXPECT_TRUE(useless.effects.empty());
     EXPECT_EQ(useless.verdict, GapVerdict::agrees);
+    EXPECT_TRUE(useless.disagreements.empty());
     ASSERT_EQ(useless.suspects.size(), 1U);
     EXPECT_EQ(useless.suspects.front().kind, "sensor_lag");
     EXPECT_NE(useless.reason.find("sensor_lag"), std::string::npos) << "a person reads what it was";
@@ -205,6 +208,14 @@ TEST(Diagnose, AnEffectIsNotNamedToFillAGapThatItDoesNotClose) {
     one_channel_only.after_rmse_C = 0.051;
     EXPECT_TRUE(withdrawn_if_useless(0.05, one_channel_only).effects.empty())
         << "the gap as a whole is larger";
+}
+
+TEST(Diagnose, WhatHasNoNameIsStillThereWhenAUselessNameIsWithdrawn) {
+    const Diagnosis useless =
+        withdrawn_if_useless(0.0495, compared(0.05, 0.051), GapVerdict::partly_explained);
+    EXPECT_TRUE(useless.effects.empty());
+    EXPECT_EQ(useless.verdict, GapVerdict::unexplained);
+    EXPECT_EQ(useless.disagreements.size(), 1U);
 }
 
 }  // namespace
