@@ -6,8 +6,8 @@ namespace thermbal {
 
 /// An effect is not named to fill a gap that it does not close: where neither the run nor the held-out runs
 /// are described better by a likelihood of independent readings, the names become suspects, the extended
-/// model the calibrated one, and the verdict `agrees`, or `unexplained` where something had no name beside them.
-/// Call it when the runs have been compared.
+/// model the calibrated one, and the verdict `agrees`, or `unexplained` where something had no name beside
+/// them. Call it when the runs have been compared.
 void withdraw_what_closes_no_gap(Diagnosis& diagnosis);
 
 /// Names that make those runs worse that nothing was fitted to are hardly what was missing: their probability
