@@ -1,5 +1,6 @@
 #include "carry_over.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -61,7 +62,10 @@ bool makes_holdouts_much_worse(const Diagnosis& diagnosis) {
 /// Whether what was found closes enough of the gaps to be named.
 bool closes_a_gap(const Diagnosis& diagnosis) {
     const double of_the_run = log_likelihood_gained(diagnosis.run);
-    if (makes_holdouts_much_worse(diagnosis)) return of_the_run >= enough_where_holdouts_grow;
+    if (makes_holdouts_much_worse(diagnosis)) {
+        const bool any_is_sure = !std::ranges::all_of(diagnosis.effects, &FoundEffect::in_doubt);
+        return any_is_sure && of_the_run >= enough_where_holdouts_grow;
+    }
     const double of_holdouts = log_likelihood_gained(diagnosis.holdouts);
     return of_the_run / enough_of_the_run + of_holdouts / enough_of_holdouts >= 1.0;
 }
@@ -91,8 +95,9 @@ void withdraw_what_closes_no_gap(Diagnosis& diagnosis) {
         diagnosis.disagreements.clear();
         diagnosis.residual_heat.clear();
     }
-    diagnosis.reason = fmt::format("{}what was found describes no run better, so that it is not named: {}",
-                                   left_something ? "something is missing; " : "", fmt::join(places, ", "));
+    diagnosis.reason =
+        fmt::format("{}what was found does not describe the runs better, so that it is not named: {}",
+                    left_something ? "something is missing; " : "", fmt::join(places, ", "));
     forget_effects(diagnosis.run);
     for (RunComparison& held : diagnosis.holdouts) forget_effects(held);
 }

@@ -124,8 +124,8 @@ Result<std::vector<FoundEffect>> describe_effects(const Evidence& evidence, cons
                 one.alternatives.push_back(suspect);
             }
         }
-        if (search.steps[k].doubtful)
-            one.probability = std::clamp(one.probability, relative_low, relative_high);
+        one.in_doubt = search.steps[k].doubtful;
+        if (one.in_doubt) one.probability = std::clamp(one.probability, relative_low, relative_high);
         one.effect.provenance = {options.found_on, one.probability, ""};
         for (std::size_t p = 0; p < one.effect.parameters.size() && p < one.parameters.size(); ++p) {
             one.effect.parameters[p].sigma = one.parameters[p].sigma;
@@ -138,7 +138,7 @@ Result<std::vector<FoundEffect>> describe_effects(const Evidence& evidence, cons
         before = std::move(after);
     }
     std::ranges::stable_sort(found, std::ranges::greater{}, [](const FoundEffect& one) {
-        return std::pair{one.probability > relative_high, one.rmse_before_C - one.rmse_after_C};
+        return std::pair{!one.in_doubt, one.rmse_before_C - one.rmse_after_C};
     });
     return found;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <string>
 
@@ -11,29 +12,41 @@
 namespace thermbal {
 namespace {
 
+std::string node_of(const Effect& effect, const Model& model) {
+    return node_of_place(form_of(effect).site, effect.at, model);
+}
+
 /// Two names at one node, or two that set in at the same moment, are one cause that the catalogue does not
 /// have, dressed up.
 bool is_dressing_up(const Effect& one, const Effect& other, const Model& model) {
     constexpr double same_moment_s = 600.0;
-    const auto node_of = [&](const Effect& effect) {
-        return node_of_place(form_of(effect).site, effect.at, model);
-    };
-    const std::string node = node_of(one);
+    const std::string node = node_of(one, model);
     const auto from_s = onset_of(one), other_from_s = onset_of(other);
-    return (!node.empty() && node == node_of(other)) ||
+    return (!node.empty() && node == node_of(other, model)) ||
            (from_s && other_from_s && std::abs(*from_s - *other_from_s) < same_moment_s);
 }
 
-void doubt_what_is_dressed_up(SearchResult& search) {
-    const std::vector<Effect>& effects = search.current.fit.model.effects;
-    const std::size_t first = effects.size() - search.steps.size();
+/// The steps that dress something up; and those at a neighbour of it, where it shows, too.
+std::vector<std::size_t> dressed_up(const SearchResult& search) {
+    const Model& model = search.current.fit.model;
+    const std::size_t first = model.effects.size() - search.steps.size();
+    const auto effect_of = [&](std::size_t step) -> const Effect& { return model.effects[first + step]; };
+    std::vector<std::size_t> found;
+    std::vector<std::string> around;
     for (std::size_t i = 0; i < search.steps.size(); ++i) {
         for (std::size_t j = 0; j < search.steps.size(); ++j) {
-            if (i != j && is_dressing_up(effects[first + i], effects[first + j], search.current.fit.model)) {
-                search.steps[i].doubtful = true;
-            }
+            if (i == j || !is_dressing_up(effect_of(i), effect_of(j), model)) continue;
+            found.push_back(i);
+            std::ranges::move(neighbours(model, node_of(effect_of(i), model)), std::back_inserter(around));
+            break;
         }
     }
+    for (std::size_t i = 0; i < search.steps.size(); ++i) {
+        const bool is_known = std::ranges::find(found, i) != found.end();
+        const bool is_around = std::ranges::find(around, node_of(effect_of(i), model)) != around.end();
+        if (!is_known && is_around) found.push_back(i);
+    }
+    return found;
 }
 
 /// A name that was taken in doubt, and after which nothing more is missing, does describe what was seen.
@@ -136,7 +149,9 @@ Result<SearchResult> search_effects(const Evidence& free, Explanation base, cons
     if (auto done = take_effects(evidence, search, options); !done) return std::unexpected(done.error());
     bool changed = false;
     const std::size_t taken = search.steps.size();
-    for (std::size_t k = 0; taken > 1 && k < taken; ++k) {
+    // What several names dress up stays without one however often it is looked at.
+    const bool look = taken > 1 && dressed_up(search).empty();
+    for (std::size_t k = 0; look && k < taken; ++k) {
         const auto other = look_again(evidence, search);
         if (!other) return std::unexpected(other.error());
         changed = changed || *other;
@@ -153,7 +168,7 @@ Result<SearchResult> search_effects(const Evidence& free, Explanation base, cons
     if (!released) return std::unexpected(released.error());
     search.current = std::move(*released);
     lift_doubt(search);
-    doubt_what_is_dressed_up(search);
+    for (const std::size_t step : dressed_up(search)) search.steps[step].doubtful = true;
     return search;
 }
 

@@ -218,5 +218,17 @@ TEST(Diagnose, WhatHasNoNameIsStillThereWhenAUselessNameIsWithdrawn) {
     EXPECT_EQ(useless.disagreements.size(), 1U);
 }
 
+TEST(Diagnose, NamesInDoubtThatMakeAHeldOutRunMuchWorseAreNoNames) {
+    Diagnosis diagnosis;
+    diagnosis.verdict = GapVerdict::partly_explained;
+    diagnosis.effects.resize(2);
+    diagnosis.effects.front().in_doubt = diagnosis.effects.back().in_doubt = true;
+    diagnosis.run = compared(0.2, 0.05);
+    diagnosis.holdouts = {compared(0.2, 0.7)};
+    withdraw_what_closes_no_gap(diagnosis);
+    EXPECT_EQ(diagnosis.verdict, GapVerdict::unexplained);
+    EXPECT_TRUE(diagnosis.effects.empty());
+}
+
 }  // namespace
 }  // namespace thermbal

@@ -74,6 +74,7 @@ struct FoundEffect {
     double from_s = 0.0;
     double to_s = 0.0;
     double probability = 0.0;
+    bool in_doubt = false;  ///< stands for something that it does not describe well
     std::vector<CalibratedParameter> parameters;
     std::optional<double> cycle_s;  ///< of a thermostat: from one switching on to the next in this run, mean
     std::vector<Suspect> alternatives;
