@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <ranges>
 #include <set>
 
 #include <fmt/format.h>
@@ -53,9 +54,7 @@ class Checker {
     }
 
     std::string node_names() const {
-        std::vector<std::string> names;
-        for (const Node& node : model_.nodes) names.push_back(node.name);
-        return fmt::format("\"{}\"", fmt::join(names, "\", \""));
+        return fmt::format("\"{}\"", fmt::join(model_.nodes | std::views::transform(&Node::name), "\", \""));
     }
 
     bool check_node_name(Table table, std::size_t index, std::string_view key, const std::string& name,
@@ -166,15 +165,13 @@ class Checker {
         const Effect& effect = model_.effects[i];
         const EffectDefinition* definition = find_effect(effect.kind);
         if (definition == nullptr) {
-            std::vector<std::string> kinds;
-            for (const EffectDefinition& known : effect_catalogue()) kinds.push_back(known.kind);
+            const auto kinds = effect_catalogue() | std::views::transform(&EffectDefinition::kind);
             return complain(Table::effect, i, "kind",
                             fmt::format("found \"{}\"; accepted: {}", effect.kind, fmt::join(kinds, ", ")));
         }
         const EffectForm* form = definition->form(effect.form);
         if (form == nullptr) {
-            std::vector<std::string> forms;
-            for (const EffectForm& known : definition->forms) forms.push_back(known.name);
+            const auto forms = definition->forms | std::views::transform(&EffectForm::name);
             return complain(Table::effect, i, "form",
                             fmt::format("found \"{}\"; accepted: {}", effect.form, fmt::join(forms, ", ")));
         }

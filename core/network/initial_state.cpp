@@ -37,7 +37,7 @@ Eigen::VectorXd first_node_readings(const CompiledNetwork& network, const Model&
 
 Eigen::VectorXd initial_temperatures(const CompiledNetwork& network, const Model& model, const Inputs& inputs,
                                      double ambient_C) {
-    const Eigen::VectorXd known_C = first_node_readings(network, model, inputs);
+    Eigen::VectorXd known_C = first_node_readings(network, model, inputs);
     const Index count = known_C.size();
     if (known_C.array().isFinite().all()) return known_C;
     // T_i = mean of its neighbours, unknown ones included, in differences to the ambient; a pull to it that
