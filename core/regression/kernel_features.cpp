@@ -48,8 +48,8 @@ KernelFactorisation::KernelFactorisation(const LagProblem& problem, double sigma
     }
 }
 
-void KernelFactorisation::extend_to(double tolerance) {
-    while (pivots_.size() < rows_) {
+void KernelFactorisation::extend_to(double tolerance, std::size_t most_features) {
+    while (pivots_.size() < most_features) {
         const auto largest = std::ranges::max_element(left_over_);
         if (!(*largest > tolerance)) break;
         add_pivot(static_cast<std::size_t>(largest - left_over_.begin()));
@@ -77,7 +77,7 @@ void KernelFactorisation::add_pivot(std::size_t pivot) {
 }
 
 KernelFeatures KernelFactorisation::features(double tolerance) {
-    extend_to(tolerance);
+    extend_to(tolerance, rows_);
     const auto beyond =
         std::ranges::find_if(largest_left_over_, [tolerance](double error) { return error <= tolerance; });
     const auto rank = beyond - largest_left_over_.begin();
@@ -85,6 +85,14 @@ KernelFeatures KernelFactorisation::features(double tolerance) {
             .pivots = {pivots_.begin(), pivots_.begin() + rank},
             .left_over = {largest_left_over_.begin(), beyond},
             .stride = stride_};
+}
+
+bool KernelFactorisation::is_within(std::size_t most_features, double tolerance) {
+    const std::size_t most = std::min(most_features, rows_);
+    extend_to(tolerance, most);
+    const double left_over =
+        pivots_.size() > most ? largest_left_over_[most] : *std::ranges::max_element(left_over_);
+    return left_over <= tolerance;
 }
 
 KernelFeatures kernel_features(const LagProblem& problem, double sigma, double tolerance,

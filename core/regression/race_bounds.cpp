@@ -22,4 +22,11 @@ double truncation(double share, double rmse, double coefficient_sum, double fine
     return std::clamp(std::exp2(2.0 * std::floor(0.5 * std::log2(enough))), finest, 1e-2);
 }
 
+std::size_t features_worth_having(std::size_t rows, double smoothing, double noise_rmse) {
+    // Normally distributed residuals: 0.8 of the rows bend times the smoothing over their standard deviation.
+    // Fewer features than half the rows are not slower (README.md).
+    const double share = std::clamp(1.2 * smoothing / noise_rmse, 0.5, 1.0);
+    return static_cast<std::size_t>(share * static_cast<double>(rows));
+}
+
 }  // namespace thermbal

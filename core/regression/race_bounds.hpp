@@ -17,4 +17,8 @@ double hopeless_rmse(double best_mean_mse, std::size_t folds);
 /// smaller is no reason to begin anew; never below `finest`.
 double truncation(double share, double rmse, double coefficient_sum, double finest);
 
+/// Of how many features one more than these costs more than a whole kernel of so many rows: about as many as
+/// rows bend at this smoothing in a window of noise.
+std::size_t features_worth_having(std::size_t rows, double smoothing, double noise_rmse);
+
 }  // namespace thermbal

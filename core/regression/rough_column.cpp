@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "race_bounds.hpp"
 
@@ -67,7 +68,8 @@ struct RoughFit {
     double rmse = 0.0;
     double lowest_rmse = 0.0;
 };
-RoughFit fit_roughly(HeldOutFold& fold, double last_smoothing) {
+template <typename HeldOut>
+RoughFit fit_roughly(HeldOut& fold, double last_smoothing) {
     const double before = fold.rmse_at(first_smoothings[0]);
     if (first_smoothings[1] > last_smoothing) static_cast<void>(fold.rmse_at(first_smoothings[1]));
     const double rmse = fold.rmse_at(last_smoothing);
@@ -94,9 +96,9 @@ RoughColumn::RoughColumn(const LagProblem& problem, std::size_t sigma_index, con
 Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(double best_mean_mse, bool skip_hopeless,
                                                                     const Cancelled& cancelled) {
     const double tolerance = rough_tolerance_factor * feature_tolerance(sigma_);
-    fitted_ = std::make_unique<FoldsOnFeatures>(kernel_features(problem_, sigma_, tolerance, stride_), folds_,
-                                                targets_, options_.epsilon);
-    HeldOutFold& first = (*fitted_)[0];
+    FoldsOnFeatures fitted(kernel_features(problem_, sigma_, tolerance, stride_), folds_, targets_,
+                           options_.epsilon);
+    HeldOutFold& first = fitted[0];
     const double hopeless = hopeless_rmse(best_mean_mse, folds_.size());
     TubeSolver::State state = first.solver().cold_start();
     double largest_coefficient = std::numeric_limits<double>::infinity();
@@ -123,11 +125,11 @@ Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(double best_
                               .lowest_rmse = fit.lowest_rmse,
                               .coefficient_sum = coefficients.lpNorm<1>(),
                               .rough_mean_mse = 0.0,
-                              .rough_states = {state}});
+                              .rough_states = {state},
+                              .rough_duals = {}});
         if (skip_hopeless && grows && fit.rmse > hopeless) break;
     }
-    kernel_ = fitted_->take_kernel();
-    fitted_.reset();
+    kernel_ = fitted.take_kernel();
     return candidates;
 }
 
@@ -136,7 +138,11 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
     const double finest = rough_tolerance_factor * feature_tolerance(sigma_);
     const double smoothing = rough_smoothing(noise_rmse, next_folds_smoothing);
     KernelFactorisation factorisation(problem_, sigma_, stride_);
+    const std::size_t most_features =
+        features_worth_having(problem_.rows() / stride_, first_smoothings[0], noise_rmse);
     double tolerance = std::numeric_limits<double>::infinity();
+    std::unique_ptr<FoldsOnFeatures> on_features;
+    std::unique_ptr<FoldsOnKernel> on_kernel;
     // At most C a row; afterwards none grows by more than C does.
     double largest_sum = options_.C_grid.front() * static_cast<double>(problem_.rows());
     SigmaCandidate fit;
@@ -147,15 +153,32 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
     for (std::size_t k = 0; k < options_.C_grid.size() && !patience.is_over(); ++k) {
         if (cancelled()) return sweep_cancelled();
         const double needed = truncation(rough_truncation_share, noise_rmse, largest_sum, finest);
-        if (needed < tolerance) {
+        if (!on_kernel && !factorisation.is_within(most_features, needed)) {
+            on_kernel = std::make_unique<FoldsOnKernel>(whole_kernel(problem_, sigma_, stride_), folds_,
+                                                        targets_, options_.epsilon);
+            if (on_features) {
+                kernel_ = on_features->take_kernel();
+                fit.rough_duals = {on(*on_kernel, kernel_, fit.rough_states.front())};
+            } else {
+                fit.rough_duals = {(*on_kernel)[0].solver().cold_start()};
+            }
+            fit.rough_states.clear();
+        } else if (!on_kernel && needed < tolerance) {
             tolerance = needed;
-            fitted_ = std::make_unique<FoldsOnFeatures>(factorisation.features(tolerance), folds_, targets_,
-                                                        options_.epsilon);
+            on_features = std::make_unique<FoldsOnFeatures>(factorisation.features(tolerance), folds_,
+                                                            targets_, options_.epsilon);
+            if (k == 0) fit.rough_states = {(*on_features)[0].solver().cold_start()};
         }
-        if (k == 0) fit.rough_states = {(*fitted_)[0].solver().cold_start()};
         const double limit_mse = margin() * margin() * least_mse;
         fit.C_index = k;
-        std::vector<double> fold_rmse = fit_all_folds(fit, smoothing, limit_mse);
+        std::vector<double> fold_rmse;
+        if (on_kernel) {
+            fold_rmse = fit_all_folds(*on_kernel, fit.rough_duals, fit, smoothing, limit_mse);
+        } else {
+            fit.rough_states.front() =
+                padded(std::move(fit.rough_states.front()), on_features->kernel().by_row.rows());
+            fold_rmse = fit_all_folds(*on_features, fit.rough_states, fit, smoothing, limit_mse);
+        }
         if (fit.rough_mean_mse > limit_mse) {
             patience.lost(growth(before, fold_rmse));
         } else {
@@ -169,39 +192,76 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
             largest_sum = fit.coefficient_sum * options_.C_grid[k + 1] / options_.C_grid[k];
         }
     }
-    if (!ranking.candidates.empty()) kernel_ = fitted_->take_kernel();
-    fitted_.reset();
+    if (on_features && !on_kernel) kernel_ = on_features->take_kernel();
     return ranking;
 }
 
-/// Goes on from the first of fit.rough_states. Every fold only adds to the mean: beyond the limit it is left
-/// as it is. Fold by fold, the root of the mean squared error.
-std::vector<double> RoughColumn::fit_all_folds(SigmaCandidate& fit, double smoothing, double limit_mse) {
+/// Goes on from the first of `states`, those of the fit. Every fold only adds to the mean: beyond the limit
+/// it is left as it is. Fold by fold, the root of the mean squared error.
+template <typename Folds, typename States>
+std::vector<double> RoughColumn::fit_all_folds(Folds& folds, States& states, SigmaCandidate& fit,
+                                               double smoothing, double limit_mse) const {
     const double C = options_.C_grid[fit.C_index] * static_cast<double>(stride_);
-    HeldOutFold& first = (*fitted_)[0];
-    first.start(C, padded(fit.rough_states.front(), fitted_->kernel().by_row.rows()));
+    auto& first = folds[0];
+    first.start(C, std::move(states.front()));
     fit.rough_rmse = fit_roughly(first, smoothing).rmse;
-    fit.rough_states = {first.solver().state()};
-    fit.coefficient_sum = first.solver().coefficients().lpNorm<1>();
+    states = {first.solver().state()};
+    fit.coefficient_sum = first.solver().coefficients().template lpNorm<1>();
     const auto count = static_cast<double>(folds_.size());
     std::vector<double> fold_rmse{fit.rough_rmse};
     double sum = fit.rough_rmse * fit.rough_rmse;
     for (std::size_t f = 1; f < folds_.size() && sum <= limit_mse * count; ++f) {
-        HeldOutFold& fold = (*fitted_)[f];
-        fold.start(C, fit.rough_states.front());
+        auto& fold = folds[f];
+        fold.start(C, states.front());
         if (smoothing < next_folds_smoothing) static_cast<void>(fold.rmse_at(next_folds_smoothing));
         const double rmse = fold.rmse_at(smoothing);
         sum += rmse * rmse;
         fold_rmse.push_back(rmse);
-        fit.rough_states.push_back(fold.solver().state());
+        states.push_back(fold.solver().state());
     }
     fit.rough_mean_mse = sum / count;
     return fold_rmse;
 }
 
-TubeSolver::State RoughColumn::on(const KernelFeatures& kernel, const TubeSolver::State& rough) const {
+TubeSolver::State RoughColumn::on(const FoldsOnFeatures& folds, const TubeSolver::State& rough) const {
     const TubeSolver::State all = padded(rough, kernel_.by_row.rows());
-    return {weights_of(kernel, kernel_.pivots, pivot_coefficients(kernel_, all.weights)), all.bias};
+    return {weights_of(folds.kernel(), kernel_.pivots, pivot_coefficients(kernel_, all.weights)), all.bias};
+}
+
+TubeSolver::State RoughColumn::on(const FoldsOnFeatures& folds, const DualSolver::State& rough) const {
+    std::vector<std::size_t> rows;
+    std::vector<double> coefficients;
+    for (Index k = 0; k < rough.coefficients.size(); ++k) {
+        if (rough.coefficients(k) == 0.0) continue;
+        rows.push_back(static_cast<std::size_t>(k) * stride_);
+        coefficients.push_back(rough.coefficients(k));
+    }
+    return {weights_of(folds.kernel(), rows, coefficients), rough.bias};
+}
+
+DualSolver::State RoughColumn::on(const FoldsOnKernel& folds, const KernelFeatures& kernel,
+                                  const TubeSolver::State& rough) {
+    const TubeSolver::State all = padded(rough, kernel.by_row.rows());
+    const std::vector<double> coefficients = pivot_coefficients(kernel, all.weights);
+    std::vector<std::pair<std::size_t, double>> of_rows;
+    for (std::size_t k = 0; k < coefficients.size(); ++k) {
+        of_rows.emplace_back(kernel.pivots[k], coefficients[k]);
+    }
+    return folds.state_of(of_rows, all.bias);
+}
+
+DualSolver::State RoughColumn::on(const FoldsOnKernel& folds, const TubeSolver::State& rough) const {
+    return on(folds, kernel_, rough);
+}
+
+DualSolver::State RoughColumn::on(const FoldsOnKernel& folds, const DualSolver::State& rough) const {
+    if (has_all_rows()) return rough;
+    std::vector<std::pair<std::size_t, double>> coefficients;
+    for (Index k = 0; k < rough.coefficients.size(); ++k) {
+        if (rough.coefficients(k) == 0.0) continue;
+        coefficients.emplace_back(static_cast<std::size_t>(k) * stride_, rough.coefficients(k));
+    }
+    return folds.state_of(coefficients, rough.bias);
 }
 
 }  // namespace thermbal

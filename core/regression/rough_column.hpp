@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "folds_on_kernel.hpp"
 #include "held_out_fold.hpp"
 #include "regression/folds.hpp"
 #include "regression/kernel_features.hpp"
@@ -24,6 +25,7 @@ struct SigmaCandidate {
     double coefficient_sum = 0.0;                 ///< of |alpha - alpha*|, about that of all rows
     double rough_mean_mse = 0.0;                  ///< over all folds, from rank_by_all_folds() alone
     std::vector<TubeSolver::State> rough_states;  ///< of the first fold, and of those fitted after it
+    std::vector<DualSolver::State> rough_duals;   ///< instead, where the rank is high
 };
 
 /// What rank_by_all_folds() found at one sigma.
@@ -56,11 +58,18 @@ class RoughColumn {
     /// much larger than the least. Measured (README.md): up to 1.06, and 1.016 where no row is left out.
     double margin() const { return has_all_rows() ? 1.03 : 1.1; }
 
-    /// The same function on other features, which must hold the rows of these.
-    TubeSolver::State on(const KernelFeatures& kernel, const TubeSolver::State& rough) const;
+    /// The same function on other features, which must hold the rows of these; or on all rows.
+    TubeSolver::State on(const FoldsOnFeatures& folds, const TubeSolver::State& rough) const;
+    TubeSolver::State on(const FoldsOnFeatures& folds, const DualSolver::State& rough) const;
+    DualSolver::State on(const FoldsOnKernel& folds, const TubeSolver::State& rough) const;
+    DualSolver::State on(const FoldsOnKernel& folds, const DualSolver::State& rough) const;
 
   private:
-    std::vector<double> fit_all_folds(SigmaCandidate& candidate, double smoothing, double limit_mse);
+    static DualSolver::State on(const FoldsOnKernel& folds, const KernelFeatures& kernel,
+                                const TubeSolver::State& rough);
+    template <typename Folds, typename States>
+    std::vector<double> fit_all_folds(Folds& folds, States& states, SigmaCandidate& candidate,
+                                      double smoothing, double limit_mse) const;
 
     const LagProblem& problem_;
     std::size_t sigma_index_;
@@ -69,8 +78,7 @@ class RoughColumn {
     const SweepOptions& options_;
     const Eigen::VectorXd& targets_;
     std::size_t stride_;
-    std::unique_ptr<FoldsOnFeatures> fitted_;  ///< while one of the two is at work
-    KernelFeatures kernel_;                    ///< of the candidates, afterwards
+    KernelFeatures kernel_;  ///< of the candidates' rough_states
 };
 
 }  // namespace thermbal

@@ -16,6 +16,9 @@ double truncation_share(std::size_t rows) {
     return rows < 800 ? 0.1 : 1.0;
 }
 
+/// 32 MB.
+constexpr std::size_t most_rows_of_whole_kernel = 2000;
+
 /// What is chosen by: a smoothing moves a prediction by about as much as it is wide.
 constexpr double across_folds_smoothing = 1e-2;
 constexpr std::array smoothings{1e-3, 1e-4, 1e-5, 1e-6};
@@ -24,10 +27,11 @@ constexpr std::array smoothings{1e-3, 1e-4, 1e-5, 1e-6};
 constexpr std::size_t smoothings_on_noise = smoothings.size() - 1;
 
 /// On noise a candidate so much worse than the best one was at the same smoothing does not win. Measured on
-/// 628 windows (README.md): no winner was worse by more than 0.6 of the smoothing over the noise, 0.02 to
-/// 0.18 of it at the widest.
+/// 628 windows (README.md): no winner was worse by more than 0.18 of the smoothing over the noise at the
+/// widest, 0.33 at 1e-3, 0.58 at 1e-4.
 double left_behind(double smoothing, double noise_rmse) {
-    return 1.0 + (smoothing == across_folds_smoothing ? 0.3 : 1.0) * smoothing / noise_rmse;
+    const double share = smoothing == across_folds_smoothing ? 0.3 : smoothing >= smoothings[0] ? 0.5 : 0.8;
+    return 1.0 + share * smoothing / noise_rmse;
 }
 
 /// As lowest_rmse(), where no step of smoothing has been seen yet. Measured on 4662 fits (README.md): none
@@ -91,9 +95,18 @@ Result<std::optional<RaceResult>> SigmaColumn::race(const SigmaCandidate& candid
                                                     const Cancelled& cancelled) {
     Race race(candidate, terms.least_rmse);
     if (race.is_lost(terms.bound)) return std::nullopt;
-    truncate_at(truncation(truncation_share(problem_.rows()), terms.small_rmse, candidate.coefficient_sum,
-                           fine_tolerance_factor * feature_tolerance(sigma_)));
-    return terms.noise_rmse > 0.0 ? all_folds_abreast(candidate, race, terms, cancelled)
+    const double tolerance =
+        truncation(truncation_share(problem_.rows()), terms.small_rmse, candidate.coefficient_sum,
+                   fine_tolerance_factor * feature_tolerance(sigma_));
+    if (terms.noise_rmse > 0.0 && wants_whole_kernel(tolerance, terms.noise_rmse)) {
+        if (!whole_) {
+            whole_ = std::make_unique<FoldsOnKernel>(whole_kernel(problem_, sigma_), folds_, targets_,
+                                                     options_.epsilon);
+        }
+        return all_folds_abreast(*whole_, candidate, race, terms, cancelled);
+    }
+    truncate_at(tolerance);
+    return terms.noise_rmse > 0.0 ? all_folds_abreast(*fitted_, candidate, race, terms, cancelled)
                                   : first_fold_ahead(candidate, race, terms, cancelled);
 }
 
@@ -105,7 +118,7 @@ Result<std::optional<RaceResult>> SigmaColumn::first_fold_ahead(const SigmaCandi
         for (std::size_t f = 0; f < folds_.size(); ++f) {
             if (cancelled()) return sweep_cancelled();
             if (step == 0) {
-                start_fold(f, candidate);
+                start_fold(*fitted_, f, candidate);
                 race.set_start(f,
                                (*fitted_)[f].rmse_at(f == 0 ? smoothings.front() : across_folds_smoothing));
                 if (race.is_lost(terms.bound)) return std::nullopt;
@@ -122,7 +135,9 @@ Result<std::optional<RaceResult>> SigmaColumn::first_fold_ahead(const SigmaCandi
 
 /// On noise most candidates are told from the best one as soon as all folds are at the same smoothing. The
 /// widest is left out where every fold is there already.
-Result<std::optional<RaceResult>> SigmaColumn::all_folds_abreast(const SigmaCandidate& candidate, Race& race,
+template <typename Folds>
+Result<std::optional<RaceResult>> SigmaColumn::all_folds_abreast(Folds& folds,
+                                                                 const SigmaCandidate& candidate, Race& race,
                                                                  const RaceTerms& terms,
                                                                  const Cancelled& cancelled) {
     const bool is_near = rough_.has_all_rows();
@@ -132,10 +147,10 @@ Result<std::optional<RaceResult>> SigmaColumn::all_folds_abreast(const SigmaCand
     for (std::size_t stage = 0; stage < stages.size(); ++stage) {
         for (std::size_t f = 0; f < folds_.size(); ++f) {
             if (cancelled()) return sweep_cancelled();
-            if (stage == 0) start_fold(f, candidate);
+            if (stage == 0) start_fold(folds, f, candidate);
             // Fold 0 leads: the others start from it.
             const double rmse =
-                (*fitted_)[f].rmse_at(f == 0 ? std::min(stages[stage], smoothings.front()) : stages[stage]);
+                folds[f].rmse_at(f == 0 ? std::min(stages[stage], smoothings.front()) : stages[stage]);
             if (stage == 0) {
                 race.set_start(f, rmse);
             } else {
@@ -153,10 +168,12 @@ Result<std::optional<RaceResult>> SigmaColumn::all_folds_abreast(const SigmaCand
 }
 
 std::size_t SigmaColumn::kept_numbers() const {
-    return (factorisation_ ? factorisation_->kept_numbers() : 0) + (fitted_ ? fitted_->kept_numbers() : 0);
+    return (whole_ ? whole_->kept_numbers() : 0) + (factorisation_ ? factorisation_->kept_numbers() : 0) +
+           (fitted_ ? fitted_->kept_numbers() : 0);
 }
 
 void SigmaColumn::release() {
+    whole_.reset();
     fitted_.reset();
     factorisation_.reset();
 }
@@ -170,12 +187,26 @@ void SigmaColumn::truncate_at(double tolerance) {
     tolerance_ = tolerance;
 }
 
+bool SigmaColumn::wants_whole_kernel(double tolerance, double noise_rmse) {
+    if (problem_.rows() > most_rows_of_whole_kernel) return false;
+    if (fitted_ && tolerance_ <= tolerance && is_worth_keeping(fitted_->kernel(), tolerance)) return false;
+    if (!factorisation_) factorisation_.emplace(problem_, sigma_);
+    const double widest = rough_.has_all_rows() ? smoothings.front() : across_folds_smoothing;
+    return !factorisation_->is_within(features_worth_having(problem_.rows(), widest, noise_rmse), tolerance);
+}
+
 /// From where the fold was roughly; where rows were left out there, the others from the first.
-void SigmaColumn::start_fold(std::size_t f, const SigmaCandidate& candidate) {
+template <typename Folds>
+void SigmaColumn::start_fold(Folds& folds, std::size_t f, const SigmaCandidate& candidate) {
     const double C = options_.C_grid[candidate.C_index];
-    const bool has_own = f == 0 || (rough_.has_all_rows() && f < candidate.rough_states.size());
-    (*fitted_)[f].start(C, has_own ? rough_.on(fitted_->kernel(), candidate.rough_states[f])
-                                   : (*fitted_)[0].solver().state());
+    const bool may_have_own = f == 0 || rough_.has_all_rows();
+    if (may_have_own && f < candidate.rough_states.size()) {
+        folds[f].start(C, rough_.on(folds, candidate.rough_states[f]));
+    } else if (may_have_own && f < candidate.rough_duals.size()) {
+        folds[f].start(C, rough_.on(folds, candidate.rough_duals[f]));
+    } else {
+        folds[f].start(C, folds[0].solver().state());
+    }
 }
 
 }  // namespace thermbal

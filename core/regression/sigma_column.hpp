@@ -58,9 +58,13 @@ class SigmaColumn {
     class Race;
     Result<std::optional<RaceResult>> first_fold_ahead(const SigmaCandidate& candidate, Race& race,
                                                        const RaceTerms& terms, const Cancelled& cancelled);
-    Result<std::optional<RaceResult>> all_folds_abreast(const SigmaCandidate& candidate, Race& race,
-                                                        const RaceTerms& terms, const Cancelled& cancelled);
-    void start_fold(std::size_t f, const SigmaCandidate& candidate);
+    template <typename Folds>
+    Result<std::optional<RaceResult>> all_folds_abreast(Folds& folds, const SigmaCandidate& candidate,
+                                                        Race& race, const RaceTerms& terms,
+                                                        const Cancelled& cancelled);
+    bool wants_whole_kernel(double tolerance, double noise_rmse);
+    template <typename Folds>
+    void start_fold(Folds& folds, std::size_t f, const SigmaCandidate& candidate);
 
     const LagProblem& problem_;
     double sigma_;
@@ -71,6 +75,7 @@ class SigmaColumn {
     std::optional<KernelFactorisation> factorisation_;
     double tolerance_ = 0.0;
     std::unique_ptr<FoldsOnFeatures> fitted_;  ///< on the features down to tolerance_
+    std::unique_ptr<FoldsOnKernel> whole_;     ///< or on none
 };
 
 }  // namespace thermbal

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "base/median.hpp"
+#include "tube_loss.hpp"
 
 namespace thermbal {
 
@@ -121,51 +121,17 @@ void TubeSolver::newton_direction() {
     }
 }
 
-/// The objective along the direction is convex and piecewise quadratic: safeguarded Newton to a slope a fifth
-/// of the first.
-double TubeSolver::step_length() {
-    const double first_slope = gradient_.dot(direction_.weights) + bias_gradient_ * direction_.bias;
-    if (!(first_slope < 0.0)) return 0.0;
-    const double along = state_.weights.dot(direction_.weights);
-    const double square = direction_.weights.squaredNorm();
-    const double enough = 0.2 * std::abs(first_slope);
-    double low = 0.0;
-    double high = std::numeric_limits<double>::infinity();
-    double t = 1.0;
-    for (int trial = 0; trial < 60; ++trial) {
-        const auto loss = vector_loops::derivatives_along(residuals_.data(), change_.data(), t,
-                                                          static_cast<std::size_t>(residuals_.size()), tube_);
-        const double slope = along + t * square - loss.first;
-        if (std::abs(slope) <= enough) break;
-        (slope < 0.0 ? low : high) = t;
-        const double next = t - slope / (square + loss.second);
-        if (next > low && next < high) {
-            t = next;
-        } else if (std::isinf(high)) {
-            t = 4.0 * t;
-        } else {
-            t = trial % 2 == 0 ? 0.5 * (low + high) : low + 0.1 * (high - low);
-        }
-    }
-    return t;
+double TubeSolver::step_length() const {
+    return length_of_step(
+        {.first_slope = gradient_.dot(direction_.weights) + bias_gradient_ * direction_.bias,
+         .along = state_.weights.dot(direction_.weights),
+         .square = direction_.weights.squaredNorm()},
+        residuals_, change_, tube_);
 }
 
-/// Without a row on the edge of the tube the bias may lie anywhere between two of them; libsvm takes the
-/// middle.
 void TubeSolver::centre_undetermined_bias() {
     if (!bending_.empty()) return;
-    double lowest = -std::numeric_limits<double>::infinity();
-    double highest = std::numeric_limits<double>::infinity();
-    for (Index i = 0; i < residuals_.size(); ++i) {
-        const double to_upper_edge = residuals_(i) - epsilon_;
-        const double to_lower_edge = residuals_(i) + epsilon_;
-        if (slopes_(i) == 0.0) lowest = std::max(lowest, to_upper_edge);
-        if (slopes_(i) < 0.0) lowest = std::max(lowest, to_lower_edge);
-        if (slopes_(i) == 0.0) highest = std::min(highest, to_lower_edge);
-        if (slopes_(i) > 0.0) highest = std::min(highest, to_upper_edge);
-    }
-    if (std::isinf(lowest) || std::isinf(highest) || lowest >= highest) return;
-    const double move = 0.5 * (lowest + highest);
+    const double move = move_to_middle(residuals_, slopes_, epsilon_);
     state_.bias += move;
     residuals_.array() -= move;
 }

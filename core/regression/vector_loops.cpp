@@ -134,6 +134,16 @@ void squared_distances_to(const double* const* lagged, std::size_t rows, const d
 }
 
 THERMBAL_EVERY_WIDTH
+void exchange_squares(const double* __restrict leaving, double leaving_at, const double* __restrict entering,
+                      double entering_at, std::size_t count, double* __restrict distance) {
+    for (std::size_t i = 0; i < count; ++i) {
+        const double out = leaving[i] - leaving_at;
+        const double in = entering[i] - entering_at;
+        distance[i] = std::max(distance[i] + (in * in - out * out), 0.0);
+    }
+}
+
+THERMBAL_EVERY_WIDTH
 void scaled_exp(double* __restrict values, std::size_t count, double factor) {
     for (std::size_t i = 0; i < count; ++i) values[i] = exp_of(factor * values[i]);
 }

@@ -34,10 +34,12 @@ class KernelFactorisation {
     KernelFactorisation(KernelFactorisation&&) = default;
 
     KernelFeatures features(double tolerance);
+    /// Whether that many features at most keep to the tolerance; stops where they do not.
+    bool is_within(std::size_t most_features, double tolerance);
     std::size_t kept_numbers() const { return features_.size() * rows_; }
 
   private:
-    void extend_to(double tolerance);
+    void extend_to(double tolerance, std::size_t most_features);
     void add_pivot(std::size_t pivot);
 
     const LagProblem* problem_;

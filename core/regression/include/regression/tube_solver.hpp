@@ -60,7 +60,7 @@ class TubeSolver {
     void take_slopes();
     void newton_direction();
     void predict_rows(const Eigen::VectorXd& weights, double bias, Eigen::VectorXd& out) const;
-    double step_length();
+    double step_length() const;
     void centre_undetermined_bias();
 
     NewtonSystem* system_;

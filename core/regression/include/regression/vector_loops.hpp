@@ -31,6 +31,11 @@ void subtract_columns(const double* const* matrix, std::size_t rows, std::size_t
 void squared_distances_to(const double* const* lagged, std::size_t rows, const double* point,
                           std::size_t lags, double* distance);
 
+/// distance[i] += (entering[i] - entering_at)^2 - (leaving[i] - leaving_at)^2, at least 0, for i < count. The
+/// two may overlap.
+void exchange_squares(const double* leaving, double leaving_at, const double* entering, double entering_at,
+                      std::size_t count, double* distance);
+
 /// values[i] = exp(factor * values[i]); factor * values[i] must lie in [-700, 0]. Error below 2e-16.
 void scaled_exp(double* values, std::size_t count, double factor);
 

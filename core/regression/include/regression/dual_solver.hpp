@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "regression/panels.hpp"
+#include "regression/vector_loops.hpp"
+#include "regression/whole_kernel.hpp"
+
+namespace thermbal {
+
+/// What TubeSolver minimises, by the same steps, for functions written by a coefficient a row of a whole
+/// kernel matrix. A step costs as many of the matrix's columns as rows bend or change: less than features of
+/// a rank above that number. Deterministic; one object a thread.
+class DualSolver {
+  public:
+    struct State {
+        Eigen::VectorXd coefficients;  ///< of every row of the kernel; 0 beyond them, here and below
+        double bias = 0.0;
+        Eigen::VectorXd residuals;  ///< target - function, of every row
+    };
+
+    /// `targets` and `is_trained` (1 or 0): one a row of the kernel, which must outlive it, with zeros up to
+    /// a multiple of eight.
+    DualSolver(const WholeKernel& kernel, const Eigen::VectorXd& targets, Eigen::VectorXd is_trained,
+               double epsilon);
+
+    /// Coefficients 0, bias the median target of the rows it is trained on.
+    State cold_start() const;
+
+    void start(double C, State from);
+    /// To where a further step moves no prediction of the rows it is trained on by more than 0.3 of the
+    /// smoothing. False if that took more than most_steps.
+    [[nodiscard]] bool descend_to(double smoothing, int most_steps);
+
+    const State& state() const { return state_; }
+    /// alpha - alpha* of every row.
+    const Eigen::VectorXd& coefficients() const { return slopes_; }
+
+  private:
+    void take_slopes();
+    void newton_direction();
+    void pick_bending();
+    double step_length() const;
+    void centre_undetermined_bias();
+    void add_kernel_columns(const std::vector<Eigen::Index>& rows, const std::vector<double>& factors);
+
+    const WholeKernel* kernel_;
+    const Eigen::VectorXd* targets_;
+    Eigen::VectorXd is_trained_;
+    vector_loops::Tube tube_;
+    State state_;
+    Eigen::VectorXd slopes_;
+    std::vector<Eigen::Index> bending_;  ///< rows where the loss is quadratic
+    std::vector<Eigen::Index> moving_;   ///< rows whose coefficient is not their slope, and by how much
+    std::vector<double> excess_;
+    // Of the step.
+    Eigen::VectorXd direction_;  ///< of the coefficients
+    double bias_direction_ = 0.0;
+    Eigen::VectorXd of_kernel_;  ///< change of every prediction without the bias
+    Eigen::VectorXd change_;     ///< of the predictions it is trained on
+    PanelMatrix system_;
+    PanelCholesky factor_;
+    Eigen::VectorXd at_bending_, of_bias_;
+    std::vector<double> of_bending_;
+};
+
+}  // namespace thermbal
