@@ -102,19 +102,16 @@ std::string what_it_follows(const FitData& data, const Model& model, const Namel
         strongest = strength;
         best = name;
     };
+    const auto recorded = [&](const std::string& column) {
+        std::vector<double> values(nameless.time_s.size());
+        std::ranges::transform(nameless.time_s, values.begin(),
+                               [&](double time_s) { return value_at(data.seen.inputs, column, time_s); });
+        return values;
+    };
     for (const Source& source : model.sources) {
-        if (source.proportional_to.empty()) continue;
-        std::vector<double> drive;
-        for (const double t : nameless.time_s)
-            drive.push_back(value_at(data.seen.inputs, source.proportional_to, t));
-        try_driver("speed", drive);
+        if (!source.proportional_to.empty()) try_driver("speed", recorded(source.proportional_to));
     }
-    if (!model.ambient.column.empty()) {
-        std::vector<double> room;
-        for (const double t : nameless.time_s)
-            room.push_back(value_at(data.seen.inputs, model.ambient.column, t));
-        try_driver("ambient", room);
-    }
+    if (!model.ambient.column.empty()) try_driver("ambient", recorded(model.ambient.column));
     try_driver("own temperature", own_temperature(data, model, nameless));
     return best;
 }
