@@ -27,6 +27,7 @@ std::vector<CalibratedParameter> describe(const FitProblem& problem, const Fit& 
 
 void state_sigmas(Model& model, const std::vector<CalibratedParameter>& parameters) {
     std::vector<double> sigmas;
+    sigmas.reserve(parameters.size());
     for (const CalibratedParameter& parameter : parameters) sigmas.push_back(parameter.sigma);
     set_parameter_sigmas(model, sigmas);
 }

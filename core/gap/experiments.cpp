@@ -60,8 +60,9 @@ Inputs inputs_for(const Plan& plan, const Model& model, const Inputs& run) {
     Inputs inputs = run;
     const double half_s = 0.5 * (run.time_s.front() + run.time_s.back());
     const auto in_two_halves = [&](double first, double second) {
-        std::vector<double> values;
-        for (const double t : run.time_s) values.push_back(t < half_s ? first : second);
+        std::vector<double> values(run.time_s.size());
+        std::ranges::transform(run.time_s, values.begin(),
+                               [&](double time_s) { return time_s < half_s ? first : second; });
         return values;
     };
     const std::set<std::string> drives = drives_of(model);

@@ -104,6 +104,7 @@ Result<Explanation> explain_anew(const Evidence& evidence, std::vector<Effect> e
 Result<Explanation> explain_with_only(const Evidence& evidence, const Explanation& explanation,
                                       const std::vector<std::size_t>& kept) {
     std::vector<Effect> effects;
+    effects.reserve(kept.size());
     for (const std::size_t k : kept) effects.push_back(explanation.effects[k]);
     const std::size_t known = evidence.prior_model.effects.size();
     const std::vector<Parameter>& parameters = explanation.fit.parameters;
