@@ -27,7 +27,7 @@ def from_the_root(md5sums):
     lines = []
     for line in md5sums.decode().splitlines():
         checksum, path = line.split("  ", 1)
-        lines.append(f"{checksum}  {path[path.index('usr/lib/debug/'):]}\n")
+        lines.append(f"{checksum}  {path[path.rindex('usr/lib/debug/'):]}\n")
     return "".join(lines).encode()
 
 

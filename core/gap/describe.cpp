@@ -20,8 +20,7 @@ std::string place_of(const Effect& effect, const Model& model) {
     const EffectSite site = form_of(effect).site;
     if (site == EffectSite::whole_model || site == EffectSite::column)
         return effect.kind == "spindle_stop" ? "all" : "ambient";
-    if (site == EffectSite::source) return model.sources[*find_source(model, effect.at)].node;
-    return effect.at;
+    return site == EffectSite::channel ? effect.at : node_of_place(site, effect.at, model);
 }
 
 /// From the onset that the effect has, for as long as it says; else the whole test.

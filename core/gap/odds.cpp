@@ -27,9 +27,8 @@ double evidence_at(const Survey& survey, bool of_sensor, const std::string& at) 
 /// has to be better than others.
 double doubt_of_sensor(const Contender& contender, const Survey& survey, const Model& model) {
     if (contender.candidate.form->site != EffectSite::channel) return 0.0;
-    const auto sensor = find_sensor(model, contender.candidate.at);
-    if (!sensor) return 0.0;
-    const double machine = evidence_at(survey, false, model.sensors[*sensor].node);
+    const double machine =
+        evidence_at(survey, false, node_of_place(EffectSite::channel, contender.candidate.at, model));
     return std::max(0.0, machine - evidence_at(survey, true, contender.candidate.at));
 }
 

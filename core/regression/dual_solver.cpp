@@ -47,25 +47,25 @@ void DualSolver::start(double C, State from) {
 }
 
 bool DualSolver::descend_to(double smoothing, int most_steps) {
-    tube_.smoothing = smoothing;
-    const double still = 0.3 * smoothing;
-    bool converged = false;
-    for (int step = 0; step < most_steps && !converged; ++step) {
-        take_slopes();
-        newton_direction();
-        const double length = step_length();
-        if (length == 0.0) {
-            converged = true;
-            break;
-        }
-        state_.coefficients += length * direction_;
-        state_.bias += length * bias_direction_;
-        state_.residuals.array() -= length * (of_kernel_.array() + bias_direction_);
-        converged = change_.lpNorm<Eigen::Infinity>() <= still;
-    }
+    const bool converged = descend(smoothing, 0.3 * smoothing, most_steps);
     take_slopes();
     centre_undetermined_bias();
     return converged;
+}
+
+bool DualSolver::descend(double smoothing, double still, int most_steps) {
+    tube_.smoothing = smoothing;
+    for (int step = 0; step < most_steps; ++step) {
+        take_slopes();
+        newton_direction();
+        const double length = step_length();
+        if (length == 0.0) return true;
+        state_.coefficients += length * direction_;
+        state_.bias += length * bias_direction_;
+        state_.residuals.array() -= length * (of_kernel_.array() + bias_direction_);
+        if (change_.lpNorm<Eigen::Infinity>() <= still) return true;
+    }
+    return false;
 }
 
 void DualSolver::centre_undetermined_bias() {

@@ -1,7 +1,10 @@
 #include "folds_on_kernel.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 
+#include "fold_descent.hpp"
 #include "regression/vector_loops.hpp"
 
 namespace thermbal {
@@ -9,17 +12,6 @@ namespace {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-
-constexpr int quick_steps_on_kernel = 100;
-constexpr int patient_steps_on_kernel = 1000;
-
-std::vector<Index> kernel_rows(const std::vector<std::size_t>& rows, std::size_t stride) {
-    std::vector<Index> kept;
-    for (const std::size_t row : rows) {
-        if (row % stride == 0) kept.push_back(static_cast<Index>(row / stride));
-    }
-    return kept;
-}
 
 VectorXd ones_at(const std::vector<Index>& rows, Index count) {
     VectorXd ones = VectorXd::Zero(count);
@@ -29,9 +21,8 @@ VectorXd ones_at(const std::vector<Index>& rows, Index count) {
 
 VectorXd targets_on(const WholeKernel& kernel, const VectorXd& targets) {
     VectorXd of_rows = VectorXd::Zero(kernel.by_row.rows());
-    for (Index k = 0; k < kernel.by_row.cols(); ++k) {
-        of_rows(k) = targets(k * static_cast<Index>(kernel.stride));
-    }
+    of_rows.head(kernel.by_row.cols()) =
+        targets(Eigen::seq(0, Eigen::last, static_cast<Index>(kernel.stride)));
     return of_rows;
 }
 
@@ -44,12 +35,7 @@ HeldOutOfKernel::HeldOutOfKernel(const WholeKernel& kernel, const Fold& fold, co
       held_out_(kernel_rows(fold.held_out_rows, kernel.stride)) {}
 
 double HeldOutOfKernel::rmse_at(double smoothing) {
-    if (!solver_.descend_to(smoothing, quick_steps_on_kernel)) {
-        for (double wide = 0.5; wide > smoothing; wide *= 0.3) {
-            static_cast<void>(solver_.descend_to(wide, patient_steps_on_kernel));
-        }
-        static_cast<void>(solver_.descend_to(smoothing, patient_steps_on_kernel));
-    }
+    descend_surely(solver_, smoothing);
     const VectorXd& residuals = solver_.state().residuals;
     double sum = 0.0;
     for (const Index row : held_out_) sum += residuals(row) * residuals(row);
@@ -64,17 +50,14 @@ FoldsOnKernel::FoldsOnKernel(WholeKernel kernel, const std::vector<Fold>& folds,
       epsilon_(epsilon),
       fitted_(folds.size()) {}
 
-DualSolver::State FoldsOnKernel::state_of(const std::vector<std::pair<std::size_t, double>>& coefficients,
-                                          double bias) const {
+DualSolver::State FoldsOnKernel::state_of(const std::vector<std::size_t>& rows,
+                                          const std::vector<double>& coefficients, double bias) const {
     DualSolver::State state{VectorXd::Zero(targets_.size()), bias, targets_.array() - bias};
-    std::vector<Index> rows;
-    std::vector<double> factors;
-    for (const auto& [row, coefficient] : coefficients) {
-        rows.push_back(static_cast<Index>(row / kernel_.stride));
-        state.coefficients(rows.back()) = coefficient;
-        factors.push_back(-coefficient);
-    }
-    vector_loops::add_rows(kernel_.by_row.data(), static_cast<std::size_t>(kernel_.by_row.rows()), rows,
+    const std::vector<Index> of_kernel = kernel_rows(rows, kernel_.stride);
+    std::vector<double> factors(coefficients.size());
+    std::ranges::transform(coefficients, factors.begin(), std::negate{});
+    for (std::size_t k = 0; k < of_kernel.size(); ++k) state.coefficients(of_kernel[k]) = coefficients[k];
+    vector_loops::add_rows(kernel_.by_row.data(), static_cast<std::size_t>(kernel_.by_row.rows()), of_kernel,
                            factors, state.residuals.data());
     return state;
 }

@@ -45,8 +45,8 @@ class FoldsOnKernel {
         if (!fitted_[f]) fitted_[f].emplace(kernel_, folds_[f], targets_, epsilon_);
         return *fitted_[f];
     }
-    /// The function with these coefficients at these rows of the problem.
-    DualSolver::State state_of(const std::vector<std::pair<std::size_t, double>>& coefficients,
+    /// The function with these coefficients at these rows of the problem, which must be the kernel's, too.
+    DualSolver::State state_of(const std::vector<std::size_t>& rows, const std::vector<double>& coefficients,
                                double bias) const;
     std::size_t kept_numbers() const { return static_cast<std::size_t>(kernel_.by_row.size()); }
 

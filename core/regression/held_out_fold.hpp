@@ -30,8 +30,6 @@ class HeldOutFold {
     const TubeSolver& solver() const { return solver_; }
 
   private:
-    void descend_patiently(double smoothing);
-
     TubeSolver solver_;
     const Eigen::MatrixXd* by_row_;
     std::vector<Eigen::Index> held_out_;

@@ -81,6 +81,21 @@ TubeSolver::State padded(TubeSolver::State state, Index rank) {
     return state;
 }
 
+/// A function by what it is made of: rows of the problem, and the coefficient of each.
+struct Combination {
+    std::vector<std::size_t> rows;
+    std::vector<double> coefficients;
+};
+Combination combination_of(const DualSolver::State& state, std::size_t stride) {
+    Combination function;
+    for (Index k = 0; k < state.coefficients.size(); ++k) {
+        if (state.coefficients(k) == 0.0) continue;
+        function.rows.push_back(static_cast<std::size_t>(k) * stride);
+        function.coefficients.push_back(state.coefficients(k));
+    }
+    return function;
+}
+
 }  // namespace
 
 RoughColumn::RoughColumn(const LagProblem& problem, std::size_t sigma_index, const std::vector<Fold>& folds,
@@ -229,25 +244,14 @@ TubeSolver::State RoughColumn::on(const FoldsOnFeatures& folds, const TubeSolver
 }
 
 TubeSolver::State RoughColumn::on(const FoldsOnFeatures& folds, const DualSolver::State& rough) const {
-    std::vector<std::size_t> rows;
-    std::vector<double> coefficients;
-    for (Index k = 0; k < rough.coefficients.size(); ++k) {
-        if (rough.coefficients(k) == 0.0) continue;
-        rows.push_back(static_cast<std::size_t>(k) * stride_);
-        coefficients.push_back(rough.coefficients(k));
-    }
-    return {weights_of(folds.kernel(), rows, coefficients), rough.bias};
+    const Combination function = combination_of(rough, stride_);
+    return {weights_of(folds.kernel(), function.rows, function.coefficients), rough.bias};
 }
 
 DualSolver::State RoughColumn::on(const FoldsOnKernel& folds, const KernelFeatures& kernel,
                                   const TubeSolver::State& rough) {
     const TubeSolver::State all = padded(rough, kernel.by_row.rows());
-    const std::vector<double> coefficients = pivot_coefficients(kernel, all.weights);
-    std::vector<std::pair<std::size_t, double>> of_rows;
-    for (std::size_t k = 0; k < coefficients.size(); ++k) {
-        of_rows.emplace_back(kernel.pivots[k], coefficients[k]);
-    }
-    return folds.state_of(of_rows, all.bias);
+    return folds.state_of(kernel.pivots, pivot_coefficients(kernel, all.weights), all.bias);
 }
 
 DualSolver::State RoughColumn::on(const FoldsOnKernel& folds, const TubeSolver::State& rough) const {
@@ -256,12 +260,8 @@ DualSolver::State RoughColumn::on(const FoldsOnKernel& folds, const TubeSolver::
 
 DualSolver::State RoughColumn::on(const FoldsOnKernel& folds, const DualSolver::State& rough) const {
     if (has_all_rows()) return rough;
-    std::vector<std::pair<std::size_t, double>> coefficients;
-    for (Index k = 0; k < rough.coefficients.size(); ++k) {
-        if (rough.coefficients(k) == 0.0) continue;
-        coefficients.emplace_back(static_cast<std::size_t>(k) * stride_, rough.coefficients(k));
-    }
-    return folds.state_of(coefficients, rough.bias);
+    const Combination function = combination_of(rough, stride_);
+    return folds.state_of(function.rows, function.coefficients, rough.bias);
 }
 
 }  // namespace thermbal

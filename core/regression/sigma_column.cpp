@@ -178,21 +178,27 @@ void SigmaColumn::release() {
     factorisation_.reset();
 }
 
-void SigmaColumn::truncate_at(double tolerance) {
-    if (fitted_ && tolerance_ <= tolerance && is_worth_keeping(fitted_->kernel(), tolerance)) return;
+bool SigmaColumn::has_features_for(double tolerance) const {
+    return fitted_ && tolerance_ <= tolerance && is_worth_keeping(fitted_->kernel(), tolerance);
+}
+
+KernelFactorisation& SigmaColumn::factorisation() {
     if (!factorisation_) factorisation_.emplace(problem_, sigma_);
+    return *factorisation_;
+}
+
+void SigmaColumn::truncate_at(double tolerance) {
+    if (has_features_for(tolerance)) return;
     fitted_.reset();
-    fitted_ = std::make_unique<FoldsOnFeatures>(factorisation_->features(tolerance), folds_, targets_,
+    fitted_ = std::make_unique<FoldsOnFeatures>(factorisation().features(tolerance), folds_, targets_,
                                                 options_.epsilon);
     tolerance_ = tolerance;
 }
 
 bool SigmaColumn::wants_whole_kernel(double tolerance, double noise_rmse) {
-    if (problem_.rows() > most_rows_of_whole_kernel) return false;
-    if (fitted_ && tolerance_ <= tolerance && is_worth_keeping(fitted_->kernel(), tolerance)) return false;
-    if (!factorisation_) factorisation_.emplace(problem_, sigma_);
+    if (problem_.rows() > most_rows_of_whole_kernel || has_features_for(tolerance)) return false;
     const double widest = rough_.has_all_rows() ? smoothings.front() : across_folds_smoothing;
-    return !factorisation_->is_within(features_worth_having(problem_.rows(), widest, noise_rmse), tolerance);
+    return !factorisation().is_within(features_worth_having(problem_.rows(), widest, noise_rmse), tolerance);
 }
 
 /// From where the fold was roughly; where rows were left out there, the others from the first.

@@ -54,6 +54,8 @@ class SigmaColumn {
     void release();
 
   private:
+    bool has_features_for(double tolerance) const;
+    KernelFactorisation& factorisation();
     void truncate_at(double tolerance);
     class Race;
     Result<std::optional<RaceResult>> first_fold_ahead(const SigmaCandidate& candidate, Race& race,

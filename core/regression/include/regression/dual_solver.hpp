@@ -40,6 +40,7 @@ class DualSolver {
     const Eigen::VectorXd& coefficients() const { return slopes_; }
 
   private:
+    bool descend(double smoothing, double still, int most_steps);
     void take_slopes();
     void newton_direction();
     void pick_bending();
