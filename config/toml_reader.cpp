@@ -110,7 +110,8 @@ std::optional<double> TableReader::number(std::string_view key, Range accepted) 
     const toml::node* node = take(key);
     if (node == nullptr) return std::nullopt;
     const auto value = node->is_number() ? node->value<double>() : std::nullopt;
-    if (value && inside(*value, accepted)) return value;
+    // -0.0 would be written out as -0, which TOML reads as the whole number 0.
+    if (value && inside(*value, accepted)) return *value + 0.0;
     complain(key, fmt::format("found {}; accepted: a number from {} to {}", shown(*node), accepted.low,
                               accepted.high));
     return std::nullopt;

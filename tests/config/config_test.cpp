@@ -183,6 +183,14 @@ TEST(Configuration, ExplainedOneMeansTheSame) {
     }
 }
 
+TEST(Configuration, MinusZeroIsZeroWhenItIsWrittenOut) {
+    const Config config = load("[test]\ninputs = { spindle_rpm = -0.0 }\n", "", "offset_C = -0.0\n");
+    const std::string explained = explain_config(config);
+    const auto again = load_config(explained, "explained", shipped_profiles());
+    ASSERT_TRUE(again) << again.error().message << explained;
+    EXPECT_EQ(explain_config(*again), explained);
+}
+
 TEST(Profiles, EveryShippedOneLoadsAndNamesItsSource) {
     const auto files = files_in("/config/profiles");
     ASSERT_GE(files.size(), 8U);
