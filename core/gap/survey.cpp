@@ -80,37 +80,6 @@ double nats_of_cycling(const Evidence& evidence, const Explanation& explanation)
     return 0.5 * evidence.run.whitening(to_and_fro_C).squaredNorm();
 }
 
-/// What sets in outside the run is only other numbers; what sets in right with a change of speed is what the
-/// model itself says too roughly of that change. A thermostat that never switches off is heat that sets in, a
-/// timer whose cycle is not seen a steady heat.
-bool sets_in_on_its_own(const Evidence& evidence, const Contender& contender) {
-    constexpr double bins = 5.0;
-    const Observation& seen = evidence.run.seen;
-    const Model& fitted = contender.explanation.fit.model;
-    const Effect& effect = fitted.effects.back();
-    if (form_of(effect).steers_itself && !switches_off(effect, fitted, seen)) return false;
-    if (form_of(effect).name == "square_wave" &&
-        nats_of_cycling(evidence, contender.explanation) < nats_of_a_seen_cycle)
-        return false;
-    const auto onset_s = onset_of(effect);
-    if (!onset_s) return true;
-    if (*onset_s < seen.time_s.front() || *onset_s > seen.time_s.back()) return false;
-    if (contender.candidate.form->parameters.front().is_time) return true;
-    const auto changes_s = drive_changes_s(evidence.prior_model, seen.inputs);
-    return std::ranges::none_of(
-        changes_s, [&](double change_s) { return std::abs(*onset_s - change_s) < bins * seen.bin_s; });
-}
-
-/// A mass that follows its node within two bins is the node's own heat capacity, of which the model has a
-/// number already.
-bool is_of_its_own(const Evidence& evidence, const Contender& contender) {
-    constexpr double bins = 2.0;
-    const Effect& effect = contender.explanation.fit.model.effects.back();
-    const double follows_within_s =
-        effect.parameter("heat_capacity_J_per_K") / effect.parameter("conductance_W_per_K");
-    return !(follows_within_s < bins * evidence.run.seen.bin_s);  // NaN: no mass
-}
-
 /// What the catalogue believes of an effect's numbers says nothing of the run.
 double chi2_without_prior_of_last_effect(const Fit& fit) {
     const Eigen::Index samples = fit.point.simulated_C.size();
@@ -123,12 +92,53 @@ double chi2_without_prior_of_last_effect(const Fit& fit) {
     return chi2;
 }
 
+/// How much better the run is described, its freedoms not paid for.
+double nats_on_the_run(const Contender& contender, const Explanation& current) {
+    return 0.5 * (current.fit.point.chi2 - chi2_without_prior_of_last_effect(contender.explanation.fit));
+}
+
+constexpr double nats_beside_a_change = 60.0;
+
+/// What sets in outside the run is only other numbers; what sets in right with a change of speed is what the
+/// model itself says too roughly of that change. A thermostat that never switches off is heat that sets in, a
+/// timer whose cycle is not seen a steady heat.
+bool sets_in_on_its_own(const Evidence& evidence, const Explanation& current, const Contender& contender) {
+    constexpr double bins = 5.0;
+    const Observation& seen = evidence.run.seen;
+    const Model& fitted = contender.explanation.fit.model;
+    const Effect& effect = fitted.effects.back();
+    if (form_of(effect).steers_itself && !switches_off(effect, fitted, seen)) return false;
+    if (form_of(effect).name == "square_wave" &&
+        nats_of_cycling(evidence, contender.explanation) < nats_of_a_seen_cycle)
+        return false;
+    const auto onset_s = onset_of(effect);
+    if (!onset_s) return true;
+    if (*onset_s < seen.time_s.front() || *onset_s > seen.time_s.back()) return false;
+    if (contender.candidate.form->parameters.front().is_time) return true;
+    const double beside_s = bins * seen.bin_s;
+    // What begins with the run has another name.
+    if (*onset_s < seen.time_s.front() + beside_s) return false;
+    const auto changes_s = drive_changes_s(evidence.prior_model, seen.inputs);
+    return nats_on_the_run(contender, current) > nats_beside_a_change ||
+           std::ranges::none_of(changes_s,
+                                [&](double change_s) { return std::abs(*onset_s - change_s) < beside_s; });
+}
+
+/// A mass that follows its node within two bins is the node's own heat capacity, of which the model has a
+/// number already.
+bool is_of_its_own(const Evidence& evidence, const Contender& contender) {
+    constexpr double bins = 2.0;
+    const Effect& effect = contender.explanation.fit.model.effects.back();
+    const double follows_within_s =
+        effect.parameter("heat_capacity_J_per_K") / effect.parameter("conductance_W_per_K");
+    return !(follows_within_s < bins * evidence.run.seen.bin_s);  // NaN: no mass
+}
+
 /// What describes the run itself worse than nothing does is there to please the held-out runs: a misfit of
 /// theirs dressed up.
 bool describes_the_run(const Contender& contender, const Explanation& current) {
     constexpr double most_nats_lost = 2.0;
-    const double chi2 = chi2_without_prior_of_last_effect(contender.explanation.fit);
-    return 0.5 * (chi2 - current.fit.point.chi2) < most_nats_lost;
+    return nats_on_the_run(contender, current) > -most_nats_lost;
 }
 
 std::vector<Contender> fitted(const Evidence& evidence, const Explanation& current,
@@ -143,7 +153,7 @@ std::vector<Contender> fitted(const Evidence& evidence, const Explanation& curre
         if (explanations[i]) contenders.push_back({chosen[i].candidate, std::move(*explanations[i]), 0.0});
     }
     std::erase_if(contenders, [&](const Contender& one) {
-        return !sets_in_on_its_own(evidence, one) || !is_of_its_own(evidence, one) ||
+        return !sets_in_on_its_own(evidence, current, one) || !is_of_its_own(evidence, one) ||
                !describes_the_run(one, current);
     });
     return contenders;

@@ -49,6 +49,23 @@ TEST(Diagnose, FindsHeatThatSetsIn) {
     EXPECT_FALSE(diagnosis->disagreements.empty());
 }
 
+/// A minute after the spindle stops.
+Result<Diagnosis> with_a_change_of_air_beside_the_stop(double factor) {
+    return diagnosis_of(
+        with("airflow_change", "housing", {{"factor", factor, 0.0}, {"onset_s", 12060.0, 0.0}}));
+}
+
+TEST(Diagnose, WhatSetsInBesideAChangeOfSpeedHasToBePlain) {
+    const auto plain = with_a_change_of_air_beside_the_stop(2.5);
+    ASSERT_TRUE(plain.has_value()) << plain.error().message;
+    ASSERT_EQ(plain->effects.size(), 1u) << plain->reason;
+    EXPECT_EQ(plain->effects.front().effect.kind, "airflow_change");
+    EXPECT_NEAR(plain->effects.front().from_s, 12060.0, 300.0);
+    const auto faint = with_a_change_of_air_beside_the_stop(1.1);
+    ASSERT_TRUE(faint.has_value()) << faint.error().message;
+    for (const FoundEffect& found : faint->effects) EXPECT_NE(found.effect.kind, "airflow_change");
+}
+
 TEST(Diagnose, ASensorIsNotTheMachine) {
     const auto diagnosis = diagnosis_of(with("sensor_drift", "T2", {{"rate_C_per_h", 0.3, 0.0}}));
     ASSERT_TRUE(diagnosis.has_value()) << diagnosis.error().message;
@@ -176,11 +193,13 @@ RunComparison compared(double before_C, double after_C) {
 }
 
 Diagnosis withdrawn_if_useless(double after_C, const RunComparison& held,
-                               GapVerdict verdict = GapVerdict::explained) {
+                               GapVerdict verdict = GapVerdict::explained,
+                               const std::string& kind = "sensor_lag") {
     Diagnosis diagnosis;
     diagnosis.verdict = verdict;
     diagnosis.disagreements.resize(1);
-    diagnosis.effects.emplace_back().effect.kind = "sensor_lag";
+    diagnosis.effects.emplace_back().effect.kind = kind;
+    diagnosis.effects.back().at = "T2";
     diagnosis.run = compared(0.05, after_C);
     diagnosis.holdouts = {held};
     withdraw_what_closes_no_gap(diagnosis);
@@ -210,6 +229,29 @@ TEST(Diagnose, AnEffectIsNotNamedToFillAGapThatItDoesNotClose) {
         << "the gap as a whole is larger";
 }
 
+TEST(Diagnose, AnEffectOfTheMachineHasToCloseLessThanAnErrorOfASensor) {
+    const auto kept = [](double after_C, const std::string& kind) {
+        return !withdrawn_if_useless(after_C, compared(0.05, 0.05), GapVerdict::explained, kind)
+                    .effects.empty();
+    };
+    EXPECT_TRUE(kept(0.0492, "slow_structure"));
+    EXPECT_FALSE(kept(0.0492, "sensor_lag"));
+    EXPECT_FALSE(kept(0.04999, "slow_structure")) << "nothing of the gap";
+}
+
+TEST(Diagnose, AnErrorOfASensorHasToShowInItsOwnChannel) {
+    const auto kept = [](const std::string& at) {
+        Diagnosis diagnosis;
+        diagnosis.effects.emplace_back().effect.kind = "sensor_lag";
+        diagnosis.effects.back().at = at;
+        diagnosis.run = compared(0.05, 0.04);  // of T2
+        withdraw_what_closes_no_gap(diagnosis);
+        return !diagnosis.effects.empty();
+    };
+    EXPECT_TRUE(kept("T2"));
+    EXPECT_FALSE(kept("T3"));
+}
+
 TEST(Diagnose, WhatHasNoNameIsStillThereWhenAUselessNameIsWithdrawn) {
     const Diagnosis useless =
         withdrawn_if_useless(0.0495, compared(0.05, 0.051), GapVerdict::partly_explained);
@@ -222,6 +264,7 @@ TEST(Diagnose, NamesInDoubtThatMakeAHeldOutRunMuchWorseAreNoNames) {
     Diagnosis diagnosis;
     diagnosis.verdict = GapVerdict::partly_explained;
     diagnosis.effects.resize(2);
+    for (FoundEffect& found : diagnosis.effects) found.effect.kind = "airflow_change";
     diagnosis.effects.front().in_doubt = diagnosis.effects.back().in_doubt = true;
     diagnosis.run = compared(0.2, 0.05);
     diagnosis.holdouts = {compared(0.2, 0.7)};
