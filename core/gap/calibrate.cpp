@@ -32,9 +32,9 @@ void state_sigmas(Model& model, const std::vector<CalibratedParameter>& paramete
     set_parameter_sigmas(model, sigmas);
 }
 
-/// The coordinates of a fit without what is not the model's: what `simulate` computes.
-Eigen::VectorXd model_alone(const FitProblem& problem, Eigen::VectorXd coordinates) {
-    coordinates.tail(problem.data().nuisances()).setZero();
+/// The coordinates of a fit with the starts as they were read: what `simulate` computes.
+Eigen::VectorXd started_as_read(const FitData& data, Eigen::VectorXd coordinates) {
+    coordinates.tail(data.nuisances()).head(static_cast<Eigen::Index>(data.starts.size())).setZero();
     return coordinates;
 }
 
@@ -49,17 +49,18 @@ double CalibratedParameter::learned() const {
 Result<ModelCalibration> calibrate(const Model& model, const RecordedTest& test,
                                    const CalibrationOptions& options) {
     if (const auto valid = validate(model); !valid) return std::unexpected(valid.error());
-    const auto data = make_fit_data(model, test, options);
+    auto data = make_fit_data(model, test, options);
     if (!data) return std::unexpected(data.error());
+    data->gradients.clear();  // a model file holds none
     const FitProblem problem(*data, model);
     const auto before = problem.evaluate(problem.prior_coordinates());
     if (!before) return std::unexpected(before.error());
     const auto fit = minimise(problem, {problem.prior_coordinates(), nullptr}, options, sequential_for);
     if (!fit) return std::unexpected(fit.error());
-    const auto after = problem.evaluate(model_alone(problem, fit->point.coordinates));
+    const auto after = problem.evaluate(started_as_read(*data, fit->point.coordinates));
     if (!after) return std::unexpected(after.error());
     ModelCalibration result;
-    result.model = fit->model;
+    result.model = with_places(*fit, *data);
     result.parameters = describe(problem, *fit);
     state_sigmas(result.model, result.parameters);
     result.channels = data->seen.channels;

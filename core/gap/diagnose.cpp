@@ -116,17 +116,6 @@ struct WrittenModels {
     Model calibrated, extended;
 };
 
-Model with_places(const Explanation& explanation, const FitData& data) {
-    Model model = explanation.fit.model;
-    const auto nuisances = explanation.fit.point.coordinates.tail(data.nuisances());
-    for (std::size_t c = 0; c < data.seen.columns(); ++c) {
-        double& place_share = model.sensors[data.seen.sensors[c]].place_share;
-        const double more = nuisances(static_cast<Eigen::Index>(data.starts.size() + c));
-        place_share = (1.0 + place_share) * (1.0 + more) - 1.0;
-    }
-    return model;
-}
-
 Result<WrittenModels> as_written(const Evidence& evidence, const SearchResult& search) {
     Evidence without_gradients = evidence;
     without_gradients.run.gradient_sigma = 1e-6;
@@ -137,12 +126,12 @@ Result<WrittenModels> as_written(const Evidence& evidence, const SearchResult& s
     take_for_spread(without_gradients, spread_seen(evidence, search.current.fit));
     auto calibrated = polish(without_gradients, search.base);
     if (!calibrated) return std::unexpected(calibrated.error());
-    const Model before = with_places(*calibrated, without_gradients.run);
+    const Model before = with_places(calibrated->fit, without_gradients.run);
     if (search.steps.empty()) return WrittenModels{before, before};
     auto extended = polish_thermostats(without_gradients, search.current);
     if (extended) extended = with_expected_sizes(without_gradients, *extended);
     if (!extended) return std::unexpected(extended.error());
-    return WrittenModels{before, with_places(*extended, without_gradients.run)};
+    return WrittenModels{before, with_places(extended->fit, without_gradients.run)};
 }
 
 /// With the effects as they were described: provenance, how well each number is known.

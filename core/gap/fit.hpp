@@ -66,6 +66,9 @@ struct Fit {
     bool converged = false;
 };
 
+/// The fitted model with each sensor where the fit has it in its node.
+Model with_places(const Fit& fit, const FitData& data);
+
 using Simulated = Result<Eigen::MatrixXd>;
 
 /// A model with open numbers, against data. Copies nothing of the data: FitData must outlive it.

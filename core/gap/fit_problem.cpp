@@ -84,6 +84,17 @@ Result<FitData> make_fit_data(const Model& model, const RecordedTest& test,
     return data;
 }
 
+Model with_places(const Fit& fit, const FitData& data) {
+    Model model = fit.model;
+    const auto nuisances = fit.point.coordinates.tail(data.nuisances());
+    for (std::size_t c = 0; c < data.seen.columns(); ++c) {
+        double& place_share = model.sensors[data.seen.sensors[c]].place_share;
+        const double more = nuisances(static_cast<Eigen::Index>(data.starts.size() + c));
+        place_share = (1.0 + place_share) * (1.0 + more) - 1.0;
+    }
+    return model;
+}
+
 FitProblem::FitProblem(const FitData& data, Model prior_model)
     : data_(&data),
       prior_model_(std::move(prior_model)),

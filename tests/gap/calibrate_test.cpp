@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "network/simulate.hpp"
 #include "small_machine.hpp"
 
 namespace thermbal {
@@ -26,6 +27,28 @@ TEST(Calibrate, BringsAModelDownToTheNoise) {
     EXPECT_TRUE(result->converged);
     EXPECT_GT(result->before_rmse_C, 0.3);
     EXPECT_LT(result->rmse_C, 0.035);  // bins of four scans: 0.025, and the noise of the first readings
+}
+
+TEST(Calibrate, TheModelIsTheFit) {
+    Model truth = another_machine();
+    truth.sensors[1].place_share = 0.015;
+    truth.sensors.push_back({"T4", "housing", 0.05, -0.015});
+    Model model = small_machine();
+    model.sensors.push_back({"T4", "housing", 0.05, 0.0});
+    const RecordedTest test = measured_on(truth, 400.0, 0.05, 1);
+    const auto result = calibrate(model, test);
+    ASSERT_TRUE(result.has_value()) << result.error().message;
+    const auto& sensors = result->model.sensors;
+    EXPECT_NEAR(sensors[1].place_share - sensors[3].place_share, 0.03, 0.004);
+    const Simulation simulation = simulate(result->model, inputs_of(test), test.time_s).value();
+    double squares = 0.0;
+    for (std::size_t c = 0; c < test.channels.size(); ++c) {
+        const auto measured = Eigen::Map<const Eigen::VectorXd>(
+            test.channels[c].values.data(), static_cast<Eigen::Index>(test.channels[c].values.size()));
+        squares += (measured - simulation.reading_C.col(static_cast<Eigen::Index>(c))).squaredNorm() /
+                   static_cast<double>(measured.size());
+    }
+    EXPECT_LT(std::sqrt(squares / 4.0), 0.06) << "noise of a scan: 0.05; without places 0.1";
 }
 
 TEST(Calibrate, SaysHowWellANumberIsKnown) {

@@ -42,7 +42,7 @@ struct CalibratedParameter {
 };
 
 struct ModelCalibration {
-    Model model;  ///< fitted values; sigmas as far as the data went
+    Model model;  ///< fitted values and places of the sensors; sigmas as far as the data went
     std::vector<CalibratedParameter> parameters;
     std::vector<std::string> channels;  ///< the columns of residual_C
     std::vector<double> time_s;         ///< the rows: middles of the bins
