@@ -11,7 +11,9 @@ double log_prior(const Candidate& candidate, const Model& model, const OddsOptio
     const double forms = static_cast<double>(candidate.definition->forms.size());
     const double places =
         std::max<double>(1.0, static_cast<double>(possible_places(*candidate.form, model).size()));
-    return std::log(options.catalogue / kinds / forms / places);
+    const bool of_sensor = candidate.form->site == EffectSite::channel;
+    return std::log(options.catalogue / kinds / forms / places *
+                    (of_sensor ? options.share_of_sensors : 1.0));
 }
 
 /// How much better heat or an error of any course there describes the run than nothing does: none at all

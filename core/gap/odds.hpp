@@ -11,6 +11,9 @@ struct OddsOptions {
     double nothing_missing = 0.55;
     double catalogue = 0.44;  ///< spread evenly over kinds, a kind's over its places
     double nameless = 0.01;
+    /// Of a sensor's kinds against the others: where it sits in its node imitates its errors, and of that the
+    /// model knows little. What effect-free machines were given a name for was mostly a sensor's (README.md).
+    double share_of_sensors = 0.05;
     /// The nameless explanation also dresses up the model's own limits, which grow with the effect: it has to
     /// be better than the named one by this much before the name is doubted.
     double nameless_discount = 0.9;

@@ -2,12 +2,14 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <optional>
 
 #include <fmt/format.h>
 
 #include "commands.hpp"
 #include "config/load.hpp"
 #include "files.hpp"
+#include "network_address.hpp"
 #include "output.hpp"
 #include "probe/report.hpp"
 #include "profile_files.hpp"
@@ -18,7 +20,7 @@ namespace {
 
 struct ProbeFlags {
     std::string where;
-    int port = 502;
+    std::optional<int> port;
     bool rtu_over_tcp = false;
     std::vector<int> bauds = {9600, 19200, 38400, 57600, 115200, 4800};
     std::string parities = "NE";
@@ -128,16 +130,16 @@ void add_common_flags(CLI::App& command, ProbeFlags& flags) {
 void add_tcp(CLI::App& probe_app, int& status) {
     CLI::App& command = *probe_app.add_subcommand("tcp", "a module or gateway on Modbus TCP");
     const auto flags = std::make_shared<ProbeFlags>();
-    command.add_option("HOST", flags->where, "name or address")->required();
-    command.add_option("--port", flags->port, "TCP port")->capture_default_str()->check(CLI::Range(1, 65535));
+    command.add_option("HOST", flags->where, "name or address, or HOST:PORT")->required();
+    command.add_option("--port", flags->port, "TCP port, when HOST has none: 502")
+        ->check(CLI::Range(1, 65535));
     command.add_flag("--rtu-over-tcp", flags->rtu_over_tcp, "the gateway passes RTU frames through");
     add_common_flags(command, *flags);
     command.callback([&status, flags] {
-        LinkOptions link;
-        link.transport = flags->rtu_over_tcp ? Transport::rtu_over_tcp : Transport::tcp;
-        link.host = flags->where;
-        link.port = flags->port;
-        status = run_probe(*flags, std::move(link));
+        auto link =
+            network_link(flags->where, flags->rtu_over_tcp ? Transport::rtu_over_tcp : Transport::tcp);
+        if (link && flags->port) link->port = *flags->port;
+        status = link ? run_probe(*flags, std::move(*link)) : report_error(link.error());
     });
 }
 

@@ -39,7 +39,7 @@ def best(unit):
 
 def a_module_of_two_units_is_recognised_by_its_types():
     with Simulator("--profile", "mb8art", "--units", "8,8", "--time-scale", "1") as sim:
-        result = probe("tcp", "127.0.0.1", "--port", str(sim.port), "--units", "1-4")
+        result = probe("tcp", f"127.0.0.1:{sim.port}", "--units", "1-4")
     units = {unit["unit_id"]: unit for unit in result["units"]}
     assert sorted(units) == [1, 2], sorted(units)
     for unit in units.values():
@@ -123,7 +123,14 @@ def nobody_there_ends_in_time_and_says_so():
     assert time.monotonic() - started < 20
 
 
+def a_port_that_is_none_is_refused():
+    for where in ("127.0.0.1:", "127.0.0.1:modbus", "127.0.0.1:123456"):
+        result = subprocess.run([CTL, "probe", "tcp", where], capture_output=True, text=True, timeout=10)
+        assert result.returncode == 2 and "accepted" in result.stderr, (where, result.returncode, result.stderr)
+
+
 if __name__ == "__main__":
     run([a_module_of_two_units_is_recognised_by_its_types, floats_with_swapped_words_are_read_rightly,
          units_of_unequal_size_as_three_by_six_has_them, over_a_serial_line,
-         resistances_of_a_foreign_module_are_shown_as_temperatures, nobody_there_ends_in_time_and_says_so])
+         resistances_of_a_foreign_module_are_shown_as_temperatures, nobody_there_ends_in_time_and_says_so,
+         a_port_that_is_none_is_refused])

@@ -55,6 +55,18 @@ TEST(Odds, OnlyWhereItMayBeTheSameCauseNoNameIsCreditedWithAForecast) {
     EXPECT_GT(named("column"), 0.99);
 }
 
+/// Where a sensor sits in its node imitates its errors: six nats more than for nothing are not enough.
+TEST(Odds, AnErrorOfASensorHasToBePlainerThanAnEffectOfTheMachine) {
+    const auto something_is_missing = [](const std::string& kind, const std::string& at, double nats) {
+        Survey survey;
+        survey.contenders.push_back(contender_of(kind, at, nats, 0.0));
+        return odds_of(survey, small_machine()).something_is_missing();
+    };
+    EXPECT_TRUE(something_is_missing("cutting_heat", "housing", 6.5));
+    EXPECT_FALSE(something_is_missing("sensor_lag", "T2", 6.5));
+    EXPECT_TRUE(something_is_missing("sensor_lag", "T2", 10.0));
+}
+
 TEST(Odds, AKindIsWhereItIsLikeliest) {
     Survey survey = survey_with(10.0, 40.0, -2.0);
     survey.contenders.push_back(contender_of("cutting_heat", "bed", 35.0, 5.0));  // forecasts count half
