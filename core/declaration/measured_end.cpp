@@ -14,12 +14,15 @@ namespace {
 
 /// Mean of the finite values at times in (until_s - mean_min, until_s].
 double mean_of(std::span<const double> values, const TestWindow& grid, double until_s, double mean_min) {
+    // Scans, counted from the start, up to a time, the scan at that time among them.
+    const auto scans_until = [&](double time_s) {
+        const double scans = std::floor((time_s - grid.start_s + 1e-6) / grid.period_s) + 1.0;
+        return static_cast<std::size_t>(std::clamp(scans, 0.0, static_cast<double>(values.size())));
+    };
     double sum = 0.0;
     std::size_t good = 0;
-    for (std::size_t k = 0; k < values.size(); ++k) {
-        const double age_s = until_s - grid.time_s(k);
-        const bool inside = age_s >= -1e-6 && age_s < mean_min * 60.0 - 1e-6;
-        if (!inside || !std::isfinite(values[k])) continue;
+    for (std::size_t k = scans_until(until_s - mean_min * 60.0); k < scans_until(until_s); ++k) {
+        if (!std::isfinite(values[k])) continue;
         sum += values[k];
         ++good;
     }

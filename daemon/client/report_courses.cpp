@@ -53,12 +53,12 @@ void take_expected(ReportChannel& channel, const Result<std::vector<ExpectedCour
 }
 
 void take_regression(ReportChannel& channel, const TestWindow& window, const std::vector<double>& time_s,
-                     const FlowOptions& flow) {
+                     const VerdictCourses& courses) {
     const SvrPrediction& svr = channel.verdict->svr;
     if (svr.n < 1 || !std::isfinite(svr.C)) return;
     const auto beyond = static_cast<std::size_t>(
         std::max(0.0, std::ceil((time_s.back() - window.end_s()) / window.period_s) + 1.0));
-    const auto course = regression_course(window, svr, channel.name, beyond, flow);
+    const auto course = courses.regression(svr, channel.name, beyond);
     if (!course) return;
     channel.regression_C.assign(time_s.size(), no_value);
     for (std::size_t i = 0; i < time_s.size(); ++i) {
@@ -82,10 +82,11 @@ void add_courses(TestReport& report, const FlowOptions& flow, const ParallelFor&
     parallel_for(windows.size(), [&](std::size_t i) {
         const auto& [end_min, channels] = windows[i];
         const TestWindow window = window_until(report.window, end_min * 60.0 + 0.5 * report.window.period_s);
-        const auto courses = expected_courses(window, flow, report.time_s);
+        const VerdictCourses courses(window, flow);
+        const auto expected = courses.expected(report.time_s);
         for (ReportChannel* const channel : channels) {
-            take_expected(*channel, courses);
-            take_regression(*channel, window, report.time_s, flow);
+            take_expected(*channel, expected);
+            take_regression(*channel, window, report.time_s, courses);
         }
     });
 }
