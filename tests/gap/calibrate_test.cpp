@@ -30,13 +30,8 @@ TEST(Calibrate, BringsAModelDownToTheNoise) {
 }
 
 TEST(Calibrate, TheModelIsTheFit) {
-    Model truth = another_machine();
-    truth.sensors[1].place_share = 0.015;
-    truth.sensors.push_back({"T4", "housing", 0.05, -0.015});
-    Model model = small_machine();
-    model.sensors.push_back({"T4", "housing", 0.05, 0.0});
-    const RecordedTest test = measured_on(truth, 400.0, 0.05, 1);
-    const auto result = calibrate(model, test);
+    const RecordedTest test = measured_on(with_two_on_the_housing(another_machine(), 0.015), 400.0, 0.05, 1);
+    const auto result = calibrate(with_two_on_the_housing(small_machine(), 0.0), test);
     ASSERT_TRUE(result.has_value()) << result.error().message;
     const auto& sensors = result->model.sensors;
     EXPECT_NEAR(sensors[1].place_share - sensors[3].place_share, 0.03, 0.004);

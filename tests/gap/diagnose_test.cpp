@@ -140,12 +140,9 @@ TEST(Diagnose, FindsASmallMassBehindANode) {
 }
 
 TEST(Diagnose, WritesWhereASensorSitsInItsNode) {
-    Model truth = small_machine();
-    truth.sensors[1].place_share = 0.015;
-    truth.sensors.push_back({"T4", "housing", 0.05, -0.015});
-    Model model = small_machine();
-    model.sensors.push_back({"T4", "housing", 0.05, 0.0});
-    const auto diagnosis = diagnose(model, measured_on(truth, 300.0, 0.05, 7), {}, {}, sequential_for);
+    const auto diagnosis = diagnose(
+        with_two_on_the_housing(small_machine(), 0.0),
+        measured_on(with_two_on_the_housing(small_machine(), 0.015), 300.0, 0.05, 7), {}, {}, sequential_for);
     ASSERT_TRUE(diagnosis.has_value()) << diagnosis.error().message;
     const auto& sensors = diagnosis->calibrated.sensors;
     EXPECT_NEAR(sensors[1].place_share - sensors[3].place_share, 0.03, 0.004);

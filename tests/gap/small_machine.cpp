@@ -21,6 +21,12 @@ Model small_machine() {
     return model;
 }
 
+Model with_two_on_the_housing(Model model, double share) {
+    model.sensors[1].place_share = share;
+    model.sensors.push_back({"T4", "housing", 0.05, -share});
+    return model;
+}
+
 RecordedTest measured_on(const Model& model, double minutes, double noise_C, unsigned seed) {
     RecordedTest test;
     Column rpm{"spindle_rpm", {}};

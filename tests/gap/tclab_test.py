@@ -18,26 +18,17 @@ DATA = pathlib.Path(os.environ.get("THERMBAL_TCLAB", ROOT.parent / "shared/data/
 
 # Two transistors with heat sinks, 4 g of aluminium and 1 W at full power each, 10 W/m2K over some 12 cm2, as the board's own
 # description has it; how well each is known is generous.
-MODEL = """
+HEATER1 = """
 [model]
-name = "two heaters"
+name = "heaters"
 ambient_C = {ambient}
 relative_sigma = 0.5
 [[node]]
 name = "heater1"
 heat_capacity_J_per_K = 6.0
-[[node]]
-name = "heater2"
-heat_capacity_J_per_K = 6.0
 [[link]]
 between = ["heater1", "ambient"]
 conductance_W_per_K = 0.018
-[[link]]
-between = ["heater2", "ambient"]
-conductance_W_per_K = 0.018
-[[link]]
-between = ["heater1", "heater2"]
-conductance_W_per_K = 0.006
 [[source]]
 node = "heater1"
 power_W = 1.0
@@ -47,6 +38,17 @@ reference = 100.0
 channel = "T1"
 node = "heater1"
 noise_C = 0.1
+"""
+HEATER2 = """
+[[node]]
+name = "heater2"
+heat_capacity_J_per_K = 6.0
+[[link]]
+between = ["heater2", "ambient"]
+conductance_W_per_K = 0.018
+[[link]]
+between = ["heater1", "heater2"]
+conductance_W_per_K = 0.006
 [[sensor]]
 channel = "T2"
 node = "heater2"
@@ -64,39 +66,20 @@ def first_on_s(rows):
     return next(float(row[0]) for row in rows[1:] if float(row[column]) > 0)
 
 
-ONE_HEATER = """
-[model]
-name = "one heater"
-ambient_C = {ambient}
-relative_sigma = 0.5
-[[node]]
-name = "heater1"
-heat_capacity_J_per_K = 6.0
-[[link]]
-between = ["heater1", "ambient"]
-conductance_W_per_K = 0.018
-[[source]]
-node = "heater1"
-power_W = 1.0
-proportional_to = "heater1_pct"
-reference = 100.0
-[[sensor]]
-channel = "T1"
-node = "heater1"
-noise_C = 0.1
-"""
-
-
 def read(name):
     return [row for row in csv.reader((DATA / name).open()) if row and not row[0].startswith("#")]
 
 
-def diagnosis_of(rows, model):
+def first_reading(rows, channel):
+    return float(rows[1][rows[0].index(channel)])
+
+
+def diagnosis_of(rows, ambient_C, model):
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         with (folder / "run.csv").open("w", newline="") as file:
             csv.writer(file).writerows(rows)
-        (folder / "model.toml").write_text(model)
+        (folder / "model.toml").write_text(model.format(ambient=ambient_C))
         ctl = pathlib.Path(os.environ["THERMBAL_BIN_DIR"]) / "thermbalctl"
         done = subprocess.run([str(ctl), "diagnose", str(folder / "run.csv"), "--model", str(folder / "model.toml"), "--json"],
                               capture_output=True, text=True, timeout=100, check=True)
@@ -111,7 +94,7 @@ def gap_of(answer):
 def the_hidden_heater_is_found():
     rows = read("two_heaters.csv")
     onset_s = first_on_s(rows)
-    answer = diagnosis_of(without_heater2(rows), MODEL.format(ambient=float(rows[1][rows[0].index("T2")])))
+    answer = diagnosis_of(without_heater2(rows), first_reading(rows, "T2"), HEATER1 + HEATER2)
     heat = [(e["kind"], e["at"], e["from_s"]) for e in answer["effects"]]
     print(f"heater 2 on at {onset_s:.0f} s; {answer['verdict']}: {heat}; {gap_of(answer)}")
     unnamed = answer["residual_heat"] and answer["residual_heat"][0]["at"] == "heater2"
@@ -122,7 +105,7 @@ def the_hidden_heater_is_found():
 def what_one_mass_lacks_is_named(name):
     known_of_such_a_board = {"surface_nonlinearity", "slow_structure", "sensor_lag"}
     rows = read(name)
-    answer = diagnosis_of(rows, ONE_HEATER.format(ambient=float(rows[1][rows[0].index("T1")])))
+    answer = diagnosis_of(rows, first_reading(rows, "T1"), HEATER1)
     named = [e["kind"] for e in answer["effects"]]
     print(f"{name}; {answer['verdict']}: {named}; {gap_of(answer)}")
     closed = answer["gap"]["after_rmse_C"] < 0.15 * answer["gap"]["before_rmse_C"]
