@@ -110,11 +110,16 @@ Result<Explanation> explain_with_only(const Evidence& evidence, const Explanatio
     const std::vector<Parameter>& parameters = explanation.fit.parameters;
     const Eigen::VectorXd& coordinates = explanation.fit.point.coordinates;
     std::vector<Eigen::Index> staying;
-    for (Eigen::Index i = 0; i < coordinates.size(); ++i) {
-        const auto p = static_cast<std::size_t>(i);
-        const bool found = p < parameters.size() && parameters[p].of_effect && parameters[p].effect >= known;
-        if (!found || std::ranges::binary_search(kept, parameters[p].effect - known)) staying.push_back(i);
-    }
+    const auto take_numbers = [&](auto which) {
+        for (std::size_t p = 0; p < parameters.size(); ++p) {
+            if (which(parameters[p])) staying.push_back(static_cast<Eigen::Index>(p));
+        }
+    };
+    take_numbers([&](const Parameter& one) { return !one.of_effect || one.effect < known; });
+    for (const std::size_t k : kept)
+        take_numbers([&](const Parameter& one) { return one.of_effect && one.effect == known + k; });
+    for (auto i = static_cast<Eigen::Index>(parameters.size()); i < coordinates.size(); ++i)
+        staying.push_back(i);
     const FitProblem problem(evidence.run, with_effects(evidence.prior_model, effects));
     return explained_from(evidence, std::move(effects), problem, {coordinates(staying), nullptr});
 }

@@ -43,8 +43,8 @@ Result<Explanation> explain(const Evidence& evidence, std::vector<Effect> effect
 Result<Explanation> explain_anew(const Evidence& evidence, std::vector<Effect> effects,
                                  const Eigen::VectorXd& coordinates);
 
-/// With these of its effects only (indices, ascending), from where it stands: a thermostat would not find
-/// back to its moments from the priors.
+/// With these of its effects only, in this order, from where it stands: a thermostat would not find back to
+/// its moments from the priors.
 Result<Explanation> explain_with_only(const Evidence& evidence, const Explanation& explanation,
                                       const std::vector<std::size_t>& kept);
 
