@@ -14,19 +14,8 @@ namespace {
 
 /// Mean of the finite values at times in (until_s - mean_min, until_s].
 double mean_of(std::span<const double> values, const TestWindow& grid, double until_s, double mean_min) {
-    // Scans, counted from the start, up to a time, the scan at that time among them.
-    const auto scans_until = [&](double time_s) {
-        const double scans = std::floor((time_s - grid.start_s + 1e-6) / grid.period_s) + 1.0;
-        return static_cast<std::size_t>(std::clamp(scans, 0.0, static_cast<double>(values.size())));
-    };
-    double sum = 0.0;
-    std::size_t good = 0;
-    for (std::size_t k = scans_until(until_s - mean_min * 60.0); k < scans_until(until_s); ++k) {
-        if (!std::isfinite(values[k])) continue;
-        sum += values[k];
-        ++good;
-    }
-    return good == 0 ? no_value : sum / static_cast<double>(good);
+    const std::size_t first = grid.scans_until(until_s - mean_min * 60.0);
+    return mean_of_good(values.subspan(first, grid.scans_until(until_s) - first));
 }
 
 /// When the channel, by means of a minute, first is 63.2 % of its way from start to end.

@@ -40,6 +40,11 @@ struct FitData {
     Eigen::Index nuisances() const {
         return static_cast<Eigen::Index>(starts.size() + seen.columns() + gradients.size());
     }
+    /// Among a fit's coordinates, each column's place.
+    Eigen::VectorXd places_in(const Eigen::VectorXd& coordinates) const {
+        return coordinates.tail(nuisances())
+            .segment(static_cast<Eigen::Index>(starts.size()), static_cast<Eigen::Index>(seen.columns()));
+    }
 };
 
 Result<FitData> make_fit_data(const Model& model, const RecordedTest& test,

@@ -86,11 +86,10 @@ Result<FitData> make_fit_data(const Model& model, const RecordedTest& test,
 
 Model with_places(const Fit& fit, const FitData& data) {
     Model model = fit.model;
-    const auto nuisances = fit.point.coordinates.tail(data.nuisances());
+    const Eigen::VectorXd places = data.places_in(fit.point.coordinates);
     for (std::size_t c = 0; c < data.seen.columns(); ++c) {
         double& place_share = model.sensors[data.seen.sensors[c]].place_share;
-        const double more = nuisances(static_cast<Eigen::Index>(data.starts.size() + c));
-        place_share = (1.0 + place_share) * (1.0 + more) - 1.0;
+        place_share = (1.0 + place_share) * (1.0 + places(static_cast<Eigen::Index>(c))) - 1.0;
     }
     return model;
 }
@@ -141,13 +140,12 @@ Simulated FitProblem::simulated(const Model& model, const Eigen::VectorXd& coord
 }
 
 Eigen::MatrixXd FitProblem::as_placed(Eigen::MatrixXd readings_C, const Eigen::VectorXd& coordinates) const {
-    const auto nuisances = coordinates.tail(data_->nuisances());
-    const auto places = nuisances.segment(static_cast<Eigen::Index>(data_->starts.size()), readings_C.cols());
+    const Eigen::VectorXd places = data_->places_in(coordinates);
     for (Eigen::Index column = 0; column < readings_C.cols(); ++column) {
         const double start_C = readings_C(0, column);
         readings_C.col(column).array() += places(column) * (readings_C.col(column).array() - start_C);
     }
-    const auto gradients_C = nuisances.tail(static_cast<Eigen::Index>(data_->gradients.size()));
+    const auto gradients_C = coordinates.tail(static_cast<Eigen::Index>(data_->gradients.size()));
     for (std::size_t k = 0; k < data_->gradients.size(); ++k) {
         const FitData::Gradient& gradient = data_->gradients[k];
         readings_C.col(gradient.column) += gradients_C(static_cast<Eigen::Index>(k)) * gradient.drive;

@@ -115,8 +115,8 @@ Result<bool> look_again(Evidence& evidence, SearchResult& search) {
     return taken.kind != old.kind || taken.at != old.at;
 }
 
-/// The first effect to the end, as it is.
-Result<void> put_last(const Evidence& evidence, SearchResult& search) {
+/// The first effect to the end, as it is: nothing is another effect afterwards.
+Result<bool> put_last(const Evidence& evidence, SearchResult& search) {
     std::vector<std::size_t> order(search.current.effects.size());
     std::iota(order.begin(), order.end(), 1);
     order.back() = 0;
@@ -124,7 +124,7 @@ Result<void> put_last(const Evidence& evidence, SearchResult& search) {
     if (!rotated) return std::unexpected(rotated.error());
     search.current = std::move(*rotated);
     std::ranges::rotate(search.steps, search.steps.begin() + 1);
-    return {};
+    return false;
 }
 
 /// What is left may be what several names at its place only dress up: it is taken instead of them when that
@@ -165,11 +165,8 @@ Result<SearchResult> search_effects(const Evidence& free, Explanation base, cons
     const bool look = taken > 1 && dressed_up(search).empty();
     for (std::size_t k = 0; look && k < taken; ++k) {
         // The last was taken with these others in place.
-        if (k + 1 == taken && !changed) {
-            if (auto done = put_last(evidence, search); !done) return std::unexpected(done.error());
-            break;
-        }
-        const auto other = look_again(evidence, search);
+        const bool is_known = k + 1 == taken && !changed;
+        const auto other = is_known ? put_last(evidence, search) : look_again(evidence, search);
         if (!other) return std::unexpected(other.error());
         changed = changed || *other;
     }

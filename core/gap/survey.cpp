@@ -97,11 +97,12 @@ double nats_on_the_run(const Contender& contender, const Explanation& current) {
     return 0.5 * (current.fit.point.chi2 - chi2_without_prior_of_last_effect(contender.explanation.fit));
 }
 
+/// Better than this describes the run what sets in right with a change of speed and is no misfit of it.
 constexpr double nats_beside_a_change = 60.0;
 
-/// What sets in outside the run is only other numbers; what sets in right with a change of speed is what the
-/// model itself says too roughly of that change. A thermostat that never switches off is heat that sets in, a
-/// timer whose cycle is not seen a steady heat.
+/// What sets in outside the run is only other numbers; what sets in right with a change of speed, and is not
+/// plain, what the model itself says too roughly of that change. A thermostat that never switches off is heat
+/// that sets in, a timer whose cycle is not seen a steady heat.
 bool sets_in_on_its_own(const Evidence& evidence, const Explanation& current, const Contender& contender) {
     constexpr double bins = 5.0;
     const Observation& seen = evidence.run.seen;

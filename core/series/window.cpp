@@ -39,6 +39,11 @@ const Column* TestWindow::input(std::string_view input_name) const {
     return find_column(inputs, input_name);
 }
 
+std::size_t TestWindow::scans_until(double until_s) const {
+    const double count = std::floor((until_s - start_s) / period_s + grid_slack) + 1.0;
+    return static_cast<std::size_t>(std::clamp(count, 0.0, static_cast<double>(scans)));
+}
+
 double median_step_s(const RecordedTest& test) {
     if (test.time_s.size() < 2) return 0.0;
     std::vector<double> steps;
@@ -89,9 +94,7 @@ RecordedTest recording_of(const TestWindow& window) {
 }
 
 TestWindow window_until(const TestWindow& window, double until_s) {
-    const double scans = std::floor((until_s - window.start_s) / window.period_s + grid_slack) + 1.0;
-    const auto count = static_cast<std::size_t>(std::clamp(scans, 0.0, static_cast<double>(window.scans)));
-    return slice(window, 0, count);
+    return slice(window, 0, window.scans_until(until_s));
 }
 
 TestWindow window_from(const TestWindow& window, double from_s) {

@@ -4,9 +4,10 @@
 
 namespace thermbal {
 
-Result<LinkOptions> network_link(const std::string& where, Transport transport) {
+Result<LinkOptions> network_link(const std::string& where, Transport transport, int port_if_none) {
     LinkOptions link;
     link.transport = transport;
+    link.port = port_if_none;
     const std::size_t colon = where.rfind(':');
     const bool is_ipv6 = colon != std::string::npos && where.find(':') != colon && where.front() != '[';
     link.host = where;

@@ -7,8 +7,9 @@
 
 namespace thermbal {
 
-/// A line to HOST, HOST:PORT, [IPV6] or [IPV6]:PORT; without a port the one that the line has anyhow. Error:
+/// A line to HOST, HOST:PORT, [IPV6] or [IPV6]:PORT; `port_if_none` where no port is said. Error:
 /// refuse_input, the port is none.
-Result<LinkOptions> network_link(const std::string& where, Transport transport);
+Result<LinkOptions> network_link(const std::string& where, Transport transport,
+                                 int port_if_none = LinkOptions{}.port);
 
 }  // namespace thermbal

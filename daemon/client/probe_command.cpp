@@ -2,7 +2,6 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
-#include <optional>
 
 #include <fmt/format.h>
 
@@ -20,7 +19,7 @@ namespace {
 
 struct ProbeFlags {
     std::string where;
-    std::optional<int> port;
+    int port = LinkOptions{}.port;
     bool rtu_over_tcp = false;
     std::vector<int> bauds = {9600, 19200, 38400, 57600, 115200, 4800};
     std::string parities = "NE";
@@ -131,14 +130,14 @@ void add_tcp(CLI::App& probe_app, int& status) {
     CLI::App& command = *probe_app.add_subcommand("tcp", "a module or gateway on Modbus TCP");
     const auto flags = std::make_shared<ProbeFlags>();
     command.add_option("HOST", flags->where, "name or address, or HOST:PORT")->required();
-    command.add_option("--port", flags->port, "TCP port, when HOST has none: 502")
+    command.add_option("--port", flags->port, "TCP port, where HOST has none")
+        ->capture_default_str()
         ->check(CLI::Range(1, 65535));
     command.add_flag("--rtu-over-tcp", flags->rtu_over_tcp, "the gateway passes RTU frames through");
     add_common_flags(command, *flags);
     command.callback([&status, flags] {
-        auto link =
-            network_link(flags->where, flags->rtu_over_tcp ? Transport::rtu_over_tcp : Transport::tcp);
-        if (link && flags->port) link->port = *flags->port;
+        auto link = network_link(flags->where, flags->rtu_over_tcp ? Transport::rtu_over_tcp : Transport::tcp,
+                                 flags->port);
         status = link ? run_probe(*flags, std::move(*link)) : report_error(link.error());
     });
 }

@@ -46,6 +46,8 @@ struct TestWindow {
 
     double time_s(std::size_t scan) const { return start_s + static_cast<double>(scan) * period_s; }
     double end_s() const { return scans == 0 ? start_s : time_s(scans - 1); }
+    /// How many of the first scans are at times <= until_s.
+    std::size_t scans_until(double until_s) const;
     const Column* channel(std::string_view channel_name) const;
     const Column* input(std::string_view input_name) const;
 };
