@@ -81,7 +81,7 @@ void NetworkBuilder::change_surface(const SurfaceChange& change) {
 }
 
 void NetworkBuilder::multiply_surfaces(std::function<double(double)> factor) {
-    network_.surface_factors.push_back(std::move(factor));
+    network_.surface_factors.emplace_back(std::move(factor));
     network_.smooth = true;
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "even_table.hpp"
 #include "input_schedule.hpp"
 #include "network/model.hpp"
 
@@ -100,9 +101,9 @@ struct CompiledNetwork {
     std::vector<HeatTerm> heat_terms;
     std::vector<SourceFactor> source_factors;
     std::vector<Thermostat> thermostats;
-    std::vector<StateFunction> ambient_shifts;                   ///< of the time alone
-    std::vector<std::function<double(double)>> surface_factors;  ///< of |node - ambient|
-    std::vector<std::pair<double, double>> stops_s;              ///< sources are off from first to second
+    std::vector<StateFunction> ambient_shifts;       ///< of the time alone
+    std::vector<EvenTable> surface_factors;          ///< of |node - ambient|
+    std::vector<std::pair<double, double>> stops_s;  ///< sources are off from first to second
     std::vector<ReadingTerm> reading_terms;
     std::vector<Detachment> detachments;
     std::vector<double> breaks_s;  ///< moments at which something jumps or kinks
@@ -122,7 +123,7 @@ class NetworkBuilder {
     void stop_sources(double from_s, double to_s);
     void add_node_behind(std::size_t node, double capacity_J_per_K, double conductance_W_per_K);
     void change_surface(const SurfaceChange& change);
-    /// Of every surface: conductance times factor(|node - ambient|).
+    /// Of every surface: conductance times factor(|node - ambient|), which is smooth and even.
     void multiply_surfaces(std::function<double(double difference_C)> factor);
     void shift_ambient(StateFunction added_C, Variation variation);
     /// The room is what a column of the recording says, to this share, and the model's ambient for the rest.

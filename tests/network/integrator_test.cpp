@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "even_table.hpp"
 #include "models.hpp"
 #include "network/effect.hpp"
 
@@ -38,6 +39,19 @@ TEST(NetworkIntegrator, HalvingTheStepShowsThirdOrder) {
         before = error;
     }
     EXPECT_LT(before, 1e-5);
+}
+
+TEST(NetworkIntegrator, ATabulatedFunctionIsTheFunction) {
+    const auto convection = [](double x) { return std::pow((x * x + 1.0) / 100.0, 0.75); };
+    const EvenTable table(convection);
+    double furthest = 0.0;
+    for (double x = 0.0; x < 64.0; x += 0.0007)
+        furthest = std::max(furthest, std::abs(table(x) - convection(x)));
+    EXPECT_LT(furthest, 1e-6);
+    EXPECT_GT(furthest, 0.0) << "or it is the function that is asked";
+    EXPECT_EQ(table(64.0), convection(64.0));
+    EXPECT_EQ(table(1e6), convection(1e6));
+    EXPECT_TRUE(std::isnan(table(std::nan(""))));
 }
 
 TEST(NetworkIntegrator, TheToleranceBoundsTheError) {
