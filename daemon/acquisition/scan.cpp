@@ -20,13 +20,14 @@ void ScanAssembler::add(LineScan reading) {
     waiting.push_back(std::move(reading));
 }
 
-std::vector<Scan> ScanAssembler::take_closed(std::int64_t now_ns, std::int64_t wall_ns) {
+std::vector<Scan> ScanAssembler::take_closed(std::int64_t now_ns, std::int64_t wall_ns, std::size_t most) {
     std::vector<Scan> closed;
     const auto every_line_is_past = [this] {
         return std::ranges::all_of(
             waiting_, [this](const auto& line) { return !line.empty() && line.back().scan >= next_; });
     };
-    while (every_line_is_past() || now_ns >= next_close_ns()) closed.push_back(close(now_ns, wall_ns));
+    while (closed.size() < most && (every_line_is_past() || now_ns >= next_close_ns()))
+        closed.push_back(close(now_ns, wall_ns));
     return closed;
 }
 

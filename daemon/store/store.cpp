@@ -470,7 +470,9 @@ Result<void> Store::set_state(TestId id, TestState state, Moment now, std::strin
         if (!may_follow(test->state, state))
             return fail(NextStep::refuse_input, fmt::format("test {} is {}: it cannot become {}", id,
                                                             to_string(test->state), to_string(state)));
-        if (!ends) return database.run("UPDATE tests SET state = ? WHERE id = ?", to_string(state), id);
+        if (!ends)
+            return database.run("UPDATE tests SET state = ?, stop_reason = ? WHERE id = ?", to_string(state),
+                                reason, id);
         return database.run(
             "UPDATE tests SET state = ?, ended_wall_ns = ?, ended_monotonic_ns = ?, stop_reason = ? WHERE id "
             "= ?",

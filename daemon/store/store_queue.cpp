@@ -18,7 +18,11 @@ constexpr std::size_t most_refused = 1000;
 StoreQueue::StoreQueue(Store store, StoreQueueLimits limits) : store_(std::move(store)), limits_(limits) {}
 
 void StoreQueue::append_scan(TestId id, ScanRecord scan) {
-    add({.scan = std::move(scan), .test = id, .write = {}, .key = {}});
+    Entry entry{.scan = std::move(scan), .test = id, .write = {}, .key = {}};
+    if (entry.holds_samples())
+        add(std::move(entry));
+    else
+        waiting_.push_back(std::move(entry));
 }
 
 void StoreQueue::write(Write write, std::string_view key) {

@@ -49,14 +49,10 @@ void Daemon::take_scan(Scan& scan) {
         }
         if (is_measuring(test_.state)) compare_with_model(scan.scan);
         if (is_measuring(test_.state) && over_time(scan)) {
-            end_test(TestEvent::abort, fmt::format("longer than test.max_duration_min = {}",
-                                                   *options_.config.test.max_duration_min));
+            stop_machine_and_end(TestEvent::abort, fmt::format("longer than test.max_duration_min = {}",
+                                                               *options_.config.test.max_duration_min));
         }
     }
-    storage_.flush();
-    progress_.store_answered(real_monotonic_ns());
-    if (storage_.damaged()) leave_damaged_database();
-    tell_storage_news();
     log_health_hourly();
     if (server_.counters().subscribers > 0) server_.publish("scan", channels_json().value_or(nullptr));
     settle(scan.scan);
@@ -114,11 +110,7 @@ void Daemon::act_on_declaration() {
     if (options_.config.test.keep_measuring) {
         event("keep_measuring", "the test goes on as configured, so that the prediction can be checked");
     } else {
-        // The machine first: should the daemon die between the two, the next one finds the test declared and
-        // stops the machine again, rather than finding it stopped and never asking.
-        test_.end_reason = test_.decision.reason;
-        carry_out_stop(TestState::declared);
-        end_test(TestEvent::stop, test_.decision.reason);
+        stop_machine_and_end(TestEvent::stop, test_.decision.reason);
     }
 }
 
@@ -212,10 +204,9 @@ void Daemon::raise_alarm(const Scan& scan) {
     const auto alarm = alarm_watch_->take(test_.grid.time_s(scan.scan), scan.samples);
     if (!alarm) return;
     const std::string& channel = options_.config.channels[alarm->channel].name;
-    test_.end_reason = fmt::format("alarm: {} {}", channel, alarm->reason);
-    event("alarm", test_.end_reason, channel);
-    carry_out_stop(TestState::aborted);
-    end_test(TestEvent::abort, test_.end_reason);
+    const std::string reason = fmt::format("alarm: {} {}", channel, alarm->reason);
+    if (!test_.stopping) event("alarm", reason, channel);
+    stop_machine_and_end(TestEvent::abort, reason);
 }
 
 bool Daemon::over_time(const Scan& scan) const {

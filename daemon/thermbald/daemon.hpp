@@ -56,6 +56,13 @@ class Daemon {
     Result<void> run();
 
   private:
+    /// The machine has been asked to stop and has not yet.
+    struct PendingStop {
+        TestEvent how = TestEvent::stop;  ///< what becomes of the test
+        std::int64_t give_up_ns = 0;      ///< on the host's own clock
+        int attempts = 0;
+    };
+
     /// The test under way, or the latest one.
     struct LiveTest {
         TestId id = 0;
@@ -73,7 +80,7 @@ class Daemon {
             -1;  ///< what was identified up to here saw samples taken back since
         double identification_s = 0.0;
         std::string end_reason;
-        int stop_attempts = 0;
+        std::optional<PendingStop> stopping;
         std::string machine;
         std::shared_ptr<const FlowOptions> flow;
         std::string
@@ -130,10 +137,12 @@ class Daemon {
     void take_comparison(const ComparisonResult& result);
 
     // The stop action (stop_action.cpp).
-    /// `state` is what the test is when the machine has been stopped.
-    void carry_out_stop(TestState state);
-    void write_stop_register();
+    /// The test ends when the machine has stopped, or when people have been told that it has not.
+    void stop_machine_and_end(TestEvent how, const std::string& reason);
+    void ask_to_stop();
+    void run_stop_command();
     void take_stop_outcome(const Result<void>& outcome);
+    void end_stopping();
 
     // Storing, events (recording.cpp).
     void store_scan(const Scan& scan);
@@ -170,7 +179,16 @@ class Daemon {
     void on_identifications();
     void close_overdue_scans();
     void arm_close_timer();
+    void see_to_storage();
+    void leave_if_done();
     void feed_watchdog();
+    /// Once, so long from now; what the same timer was set to before is forgotten.
+    void wake_after(sd_event_source*& timer, std::int64_t wait_ns, sd_event_time_handler_t handler);
+    template <void (Daemon::*Handler)()>
+    static int on_time(sd_event_source* /*timer*/, std::uint64_t /*usec*/, void* self) {
+        (static_cast<Daemon*>(self)->*Handler)();
+        return 0;
+    }
     void leave_nothing_unstored();
     void settle(std::int64_t scan);
 
@@ -196,6 +214,7 @@ class Daemon {
     sd_event* loop_ = nullptr;
     sd_event_source* close_timer_ = nullptr;
     sd_event_source* watchdog_timer_ = nullptr;
+    sd_event_source* stop_timer_ = nullptr;
 
     Mailbox<LineScan> line_readings_;
     Mailbox<IdentificationResult> identifications_;

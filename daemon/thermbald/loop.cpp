@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <csignal>
 #include <cstring>
 #include <utility>
@@ -43,7 +42,7 @@ Result<void> check(int code, std::string_view what) {
 Result<std::unique_ptr<Daemon>> Daemon::create(DaemonOptions options, Clock& clock) {
     const Config& config = options.config;
     // Nobody waits for a lock for longer than a scan may: what the store does not take now waits in memory.
-    const std::int64_t period_ns = std::llround(config.test.period_s * 1e9);
+    const std::int64_t period_ns = period_ns_of(config.test.period_s);
     const std::int64_t real_period_ns = clock.real_ns_until(clock.monotonic_ns() + period_ns);
     const StoreOptions store_options{
         .busy_timeout_ms = static_cast<int>(std::clamp<std::int64_t>(real_period_ns / 8'000'000, 10, 2000))};
@@ -100,8 +99,7 @@ Daemon::~Daemon() {
     readers_.clear();
     identifier_.reset();
     comparer_.reset();
-    sd_event_source_unref(close_timer_);
-    sd_event_source_unref(watchdog_timer_);
+    for (sd_event_source* timer : {close_timer_, watchdog_timer_, stop_timer_}) sd_event_source_unref(timer);
     sd_event_unref(loop_);
 }
 
@@ -170,16 +168,6 @@ Result<void> Daemon::attach() {
             return added;
         }
     }
-    const auto on_close_time = [](sd_event_source*, std::uint64_t, void* self) {
-        static_cast<Daemon*>(self)->close_overdue_scans();
-        return 0;
-    };
-    if (auto added = check(
-            sd_event_add_time(loop_, &close_timer_, CLOCK_BOOTTIME, UINT64_MAX, 1000, on_close_time, this),
-            "timer");
-        !added) {
-        return added;
-    }
     add_methods();
     return {};
 }
@@ -203,8 +191,7 @@ Result<void> Daemon::run() {
         if (!plan) return std::unexpected(plan.error());
         if (const auto id = start_test(std::move(*plan)); !id) return std::unexpected(id.error());
     } else {
-        follow_grid({clock_.monotonic_ns(), static_cast<std::int64_t>(options_.config.test.period_s * 1e9)},
-                    0);
+        follow_grid({clock_.monotonic_ns(), period_ns_of(options_.config.test.period_s)}, 0);
     }
     notify_ready(is_measuring(test_.state) ? fmt::format("test {} is running", test_.id)
                                            : "no test is running");
@@ -237,10 +224,12 @@ void Daemon::on_line_readings() {
     close_overdue_scans();
 }
 
+/// After a standstill of days some at a time, so that nothing else waits for all of them.
 void Daemon::close_overdue_scans() {
+    constexpr std::size_t most_at_once = 200;
     const std::uint64_t generation = generation_;
-    for (Scan& scan :
-         assembler_->take_closed(clock_.monotonic_ns() - close_grace_ns, clock_.wall_ns() - close_grace_ns)) {
+    for (Scan& scan : assembler_->take_closed(clock_.monotonic_ns() - close_grace_ns,
+                                              clock_.wall_ns() - close_grace_ns, most_at_once)) {
         (scan.status == ScanStatus::missed ? scans_missed_
          : scan.status == ScanStatus::late ? scans_late_
                                            : scans_ok_)++;
@@ -248,10 +237,22 @@ void Daemon::close_overdue_scans() {
         if (generation != generation_)
             break;  // a test began or ended on this scan: the others belong to the old grid
     }
-    if (options_.exit_when_ended && test_.id > 0 && !is_measuring(test_.state) && hooks_.running() == 0) {
-        sd_event_exit(loop_, 0);
-    }
+    see_to_storage();
+    leave_if_done();
     arm_close_timer();
+}
+
+void Daemon::see_to_storage() {
+    storage_.flush();
+    progress_.store_answered(real_monotonic_ns());
+    if (storage_.damaged()) leave_damaged_database();
+    tell_storage_news();
+}
+
+void Daemon::leave_if_done() {
+    const bool has_ended = test_.id > 0 && !is_measuring(test_.state);
+    if (options_.exit_when_ended && has_ended && !test_.stopping && hooks_.running() == 0)
+        sd_event_exit(loop_, 0);
 }
 
 void Daemon::on_identifications() {
@@ -260,12 +261,8 @@ void Daemon::on_identifications() {
 
 /// A silent line must not hold the others: the oldest open scan is closed when its period is over.
 void Daemon::arm_close_timer() {
-    const std::int64_t wait_ns =
-        std::max<std::int64_t>(clock_.real_ns_until(assembler_->next_close_ns() + close_grace_ns), 0);
-    std::uint64_t now_us = 0;
-    sd_event_now(loop_, CLOCK_BOOTTIME, &now_us);
-    sd_event_source_set_time(close_timer_, now_us + static_cast<std::uint64_t>(wait_ns) / 1000 + 1);
-    sd_event_source_set_enabled(close_timer_, SD_EVENT_ONESHOT);
+    wake_after(close_timer_, clock_.real_ns_until(assembler_->next_close_ns() + close_grace_ns),
+               on_time<&Daemon::close_overdue_scans>);
 }
 
 /// systemd hears from us only while every line and the store make progress.
@@ -277,24 +274,26 @@ void Daemon::feed_watchdog() {
     } else {
         notify_watchdog();
     }
-    std::uint64_t now_us = 0;
-    sd_event_now(loop_, CLOCK_MONOTONIC, &now_us);
-    const std::uint64_t due_us = now_us + static_cast<std::uint64_t>(interval->count());
-    if (watchdog_timer_ == nullptr) {
-        const auto again = [](sd_event_source*, std::uint64_t, void* self) {
-            static_cast<Daemon*>(self)->feed_watchdog();
-            return 0;
-        };
-        sd_event_add_time(loop_, &watchdog_timer_, CLOCK_MONOTONIC, due_us, 0, again, this);
-        return;
+    wake_after(watchdog_timer_, std::chrono::nanoseconds(*interval).count(), on_time<&Daemon::feed_watchdog>);
+}
+
+void Daemon::wake_after(sd_event_source*& timer, std::int64_t wait_ns, sd_event_time_handler_t handler) {
+    constexpr std::uint64_t accuracy_us = 1000;
+    const std::uint64_t wait_us = static_cast<std::uint64_t>(std::max<std::int64_t>(wait_ns, 0)) / 1000 + 1;
+    int set = 0;
+    if (timer == nullptr) {
+        set = sd_event_add_time_relative(loop_, &timer, CLOCK_BOOTTIME, wait_us, accuracy_us, handler, this);
+    } else {
+        set = sd_event_source_set_time_relative(timer, wait_us);
+        if (set >= 0) set = sd_event_source_set_enabled(timer, SD_EVENT_ONESHOT);
     }
-    sd_event_source_set_time(watchdog_timer_, due_us);
-    sd_event_source_set_enabled(watchdog_timer_, SD_EVENT_ONESHOT);
+    if (set < 0) spdlog::critical("a timer of the event loop: {}", strerrordesc_np(-set));
 }
 
 /// Time may go on (for a clock that waits): the scan is stored, and identified where that was due.
 void Daemon::settle(std::int64_t scan) {
-    if (test_.identifying || test_.comparing) return;
+    const bool is_stopping = test_.stopping && is_measuring(test_.state);
+    if (test_.identifying || test_.comparing || is_stopping) return;
     if (assembler_) clock_.settled(assembler_->grid().due_ns(scan));
 }
 

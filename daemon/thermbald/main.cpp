@@ -13,6 +13,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "abort_test.hpp"
 #include "config/load.hpp"
 #include "daemon.hpp"
 #include "manual/manual.hpp"
@@ -31,6 +32,7 @@ struct Flags {
     std::int64_t time_epoch_ns = -1;
     bool lockstep = false;
     bool exit_when_ended = false;
+    bool abort_test = false;
 };
 
 /// In a sandbox that hides /proc/sys the unit says it. Without either, every start counts as a boot of its
@@ -103,6 +105,11 @@ int main(int argc, char** argv) {
                        "effect, and end")
             ->expected(0, 1);
     app.add_option("--profiles", flags.profiles, "a further folder with module profiles, looked up first");
+    app.add_flag(
+           "--abort-test", flags.abort_test,
+           "end the test that is open in the database as aborted, and end: where the configuration that it "
+           "was begun with is gone; the machine is not stopped")
+        ->excludes(check);
     app.add_flag("--exit-when-ended", flags.exit_when_ended,
                  "end when a test has ended (demonstrations, tests)");
     CLI::Option_group& time = *app.add_option_group("time", "Faster than time, with a simulated module:");
@@ -141,6 +148,14 @@ int main(int argc, char** argv) {
         return 0;
     }
 
+    if (flags.abort_test) {
+        const auto clock = system_clock();
+        const auto done = abort_open_test(config->store.path, {clock->wall_ns(), clock->monotonic_ns()});
+        if (!done) return refused(done.error());
+        fmt::print("{}\n", *done);
+        return 0;
+    }
+
     spdlog::set_default_logger(spdlog::stderr_logger_mt("thermbald"));
     spdlog::set_level(spdlog::level::from_str(config->log.level));
     // Under systemd the journal stamps every line.
@@ -154,7 +169,7 @@ int main(int argc, char** argv) {
     if (!daemon) return refused(daemon.error());
     if (const auto ended = (*daemon)->run(); !ended) {
         spdlog::critical("{}", ended.error().message);
-        return 1;
+        return ended.error().next == NextStep::refuse_input ? 2 : 1;
     }
     return 0;
 }

@@ -75,8 +75,8 @@ std::vector<ChannelSample> ModbusLine::read_scan() {
         check_types(u, reading);
         for (const auto& [channel, input, calibration] : unit.channels) {
             Sample sample = calibrated(reading.samples[input], calibration);
-            // The number is of another kind of sensor: there is no trustworthy answer.
-            if (sample.good() && unit.input_is_wrong[input]) {
+            // The number is, or may be, of another kind of sensor: there is no trustworthy answer.
+            if (sample.good() && !unit.trusts(input)) {
                 sample = {.raw = sample.raw, .value_C = no_value, .quality = Quality::communication};
             }
             samples.push_back({channel, sample});
@@ -97,7 +97,11 @@ void ModbusLine::check_types(std::size_t u, const UnitReading& reading) {
     }
     if (unit.types == Types::right || unit.types == Types::unreadable) return;
     const auto codes = read_type_codes(*link_, unit.plan.unit_id, profile);
-    if (!codes && codes.error().next != NextStep::retry) return;
+    // A module may be silent on registers that it does not have, instead of saying so.
+    constexpr int most_unanswered = 3;
+    const bool is_silent = !codes && codes.error().next != NextStep::retry;
+    if (is_silent && ++unit.unanswered_type_reads < most_unanswered) return;
+    unit.unanswered_type_reads = 0;
     const std::string wrong = codes ? wrong_types(profile, *codes) : std::string();
     const Types found = !codes ? Types::unreadable : wrong.empty() ? Types::right : Types::wrong;
     for (std::size_t input = 0; input < unit.input_is_wrong.size(); ++input) {

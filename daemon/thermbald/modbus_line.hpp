@@ -60,7 +60,13 @@ class ModbusLine final : public Line {
         /// restart us.
         enum class Types : std::uint8_t { unknown, right, wrong, unreadable };
         Types types = Types::unknown;
+        int unanswered_type_reads = 0;
         std::vector<bool> input_is_wrong = {};
+
+        bool trusts(std::size_t input) const {
+            const bool is_known = !plan.profile.type_code || types != Types::unknown;
+            return is_known && !input_is_wrong[input];
+        }
     };
 
     void check_types(std::size_t unit, const UnitReading& reading);

@@ -27,7 +27,7 @@ ScanRecord Daemon::record_of(const Scan& scan) const {
 void Daemon::store_scan(const Scan& scan) {
     const std::int64_t started_ns = real_monotonic_ns();
     storage_.append_scan(test_.id, record_of(scan));
-    if (storage_.problem().empty()) {
+    if (storage_.problem().empty() && scan.status != ScanStatus::missed) {
         commit_ms_.add(static_cast<double>(real_monotonic_ns() - started_ns) * 1e-6);
     }
 }

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
@@ -17,14 +16,31 @@
 namespace thermbal {
 namespace {
 
-std::int64_t period_ns_of(double period_s) {
-    return std::llround(period_s * 1e9);
-}
+/// A week: every missed scan of it becomes a row. A clock that was wrong, once it is set, says decades.
+constexpr std::int64_t longest_standstill_of_test_ns = 7 * 86'400'000'000'000;
 
 std::string describe_source(const Config& config, const ChannelConfig& channel) {
     const UnitConfig& unit = config.units[channel.unit];
     return fmt::format("line {}, unit {} (id {}), input {}", config.lines[unit.line].link.name, unit.name,
                        unit.unit_id, channel.input);
+}
+
+std::string describe(const ChannelRecord& channel) {
+    return fmt::format("{} ({}{}{})", channel.name, channel.source, channel.calibration.empty() ? "" : ", ",
+                       channel.calibration);
+}
+
+/// Where a test's samples would be of something else than they were; empty: nowhere. Roles, places and which
+/// channels are required may change within a test.
+std::string difference_of_setup(const TestRecord& begun, const TestRecord& now) {
+    if (begun.period_s != now.period_s)
+        return fmt::format("test.period_s was {} and is {}", begun.period_s, now.period_s);
+    for (std::size_t i = 0; i < std::max(begun.channels.size(), now.channels.size()); ++i) {
+        const std::string was = i < begun.channels.size() ? describe(begun.channels[i]) : "none";
+        const std::string is = i < now.channels.size() ? describe(now.channels[i]) : "none";
+        if (was != is) return fmt::format("channel {} was {} and is {}", i + 1, was, is);
+    }
+    return {};
 }
 
 }  // namespace
@@ -126,6 +142,15 @@ void Daemon::begin_window(double period_s) {
 Result<std::optional<ResumedTest>> Daemon::take_up_test() {
     auto resumed = storage_.store().resume();
     if (!resumed || !*resumed) return resumed;
+    const TestRecord& begun = (*resumed)->test.record;
+    const std::string difference =
+        difference_of_setup(begun, test_record(begun.name, begun.machine, nullptr));
+    if (!difference.empty()) {
+        return fail(NextStep::refuse_input,
+                    fmt::format("test {} \"{}\" is still open and was begun with another set-up: {}. Put the "
+                                "configuration back to go on with it, or end it: thermbald --abort-test",
+                                (*resumed)->test.id, begun.name, difference));
+    }
     if (auto restored = restore(**resumed); !restored) {
         test_ = LiveTest{};
         return std::unexpected(restored.error());
@@ -154,23 +179,18 @@ Result<void> Daemon::restore(const ResumedTest& resumed) {
         }
     }
 
+    test_.decision.reason = stored.stop_reason;
     begin_window(record.period_s);
-    // Where each stored channel is now; those that are no more have no place.
-    std::vector<std::size_t> position;
-    const auto& channels = options_.config.channels;
-    for (const ChannelRecord& channel : record.channels) {
-        const auto found = std::ranges::find(channels, channel.name, &ChannelConfig::name);
-        position.push_back(static_cast<std::size_t>(found - channels.begin()));
-    }
+    const std::size_t channels = options_.config.channels.size();
     const auto read = storage_.store().read().each_scan(stored.id, 0, INT64_MAX, [&](ScanRecord& scan) {
-        Scan again{.scan = scan.scan, .samples = std::vector<Sample>(channels.size())};
-        for (std::size_t i = 0; i < std::min(scan.samples.size(), position.size()); ++i) {
-            if (position[i] < channels.size()) again.samples[position[i]] = scan.samples[i];
-        }
+        Scan again{.scan = scan.scan, .samples = std::move(scan.samples)};
+        again.samples.resize(channels);
         for (const InputValue& input : scan.inputs) set_input({input.name, input.value});
-        grow_window(again);
-        // Only so that a limit goes on where it was: what was an alarm has ended the test then.
+        // Only so that they go on where they were: a frozen module is known, what was an alarm has ended the
+        // test then.
+        freeze_watch_.take(again);
         alarm_watch_->take(test_.grid.time_s(again.scan), again.samples);
+        grow_window(again);
     });
     if (!read) return read;
     std::vector<ChannelVerdict> verdicts;
@@ -191,10 +211,18 @@ void Daemon::go_on_with(const ResumedTest& resumed) {
     prepare_flow(record.machine);
     resume_model(record);
     const std::int64_t last_scan = resumed.test.last_scan.value_or(-1);
+    const std::int64_t missed =
+        std::max<std::int64_t>(test_.grid.scan_at(clock_.monotonic_ns()) - last_scan - 1, 0);
+    const std::int64_t missed_ns = missed * test_.grid.period_ns;
+    if (missed_ns > longest_standstill_of_test_ns) {
+        end_test(TestEvent::abort,
+                 fmt::format("by the host's clock {} h have gone by since its last scan: too long to go on",
+                             missed_ns / 3'600'000'000'000));
+        return follow_grid({clock_.monotonic_ns(), test_.grid.period_ns}, 0);
+    }
     follow_grid(test_.grid, last_scan + 1);
-    const std::int64_t missed = test_.grid.scan_at(clock_.monotonic_ns()) - last_scan - 1;
     event("resumed", fmt::format("test {} \"{}\" goes on: {} scans are stored, about {} were missed",
-                                 test_.id, test_.name, last_scan + 1, std::max<std::int64_t>(missed, 0)));
+                                 test_.id, test_.name, last_scan + 1, missed));
     if (test_.state == TestState::declared) act_on_declaration();
 }
 
@@ -221,7 +249,7 @@ void Daemon::resume_model(const TestRecord& record) {
 
 void Daemon::follow_grid(Grid grid, std::int64_t first_scan) {
     ++generation_;
-    freeze_watch_.begin_grid();
+    if (first_scan == 0) freeze_watch_.begin_grid();
     std::vector<std::size_t> channel_line;
     channel_line.reserve(options_.config.channels.size());
     for (const ChannelConfig& channel : options_.config.channels) {

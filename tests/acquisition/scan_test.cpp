@@ -62,6 +62,17 @@ TEST(ScanAssembler, SkippedScansAreMissedRowsInOrder) {
     EXPECT_EQ(closed[3].status, ScanStatus::ok);
 }
 
+TEST(ScanAssembler, AfterALongStandstillTheOldestComeFirst) {
+    ScanAssembler assembler(grid, 1, 0, {0}, 1);
+    const std::int64_t now_ns = grid.due_ns(1'000'000);
+    for (std::int64_t first = 0; first < 9; first += 3) {
+        const auto closed = assembler.take_closed(now_ns, now_ns, 3);
+        ASSERT_EQ(closed.size(), 3U);
+        EXPECT_EQ(closed.front().scan, first);
+        EXPECT_EQ(closed.back().scan, first + 2);
+    }
+}
+
 TEST(ScanAssembler, LateRepeatedForeignAndClosedReadings) {
     ScanAssembler assembler(grid, 1, 0, {0}, 1);
     assembler.add(reading(0, 0, {0}, grid.due_ns(0) + 2 * s));

@@ -2,6 +2,9 @@
 inputs on one line, as a 3 x 6 set-up has them."""
 import pathlib
 import socket
+import socketserver
+import struct
+import threading
 
 from daemon_support import SOURCE, Daemon, Simulator, configuration, control, database, run, scratch, wait_until
 
@@ -69,5 +72,35 @@ def inputs_set_to_another_sensor_are_marked():
                 assert ("is set to type 512" in wrong) == (quality == "communication"), wrong
 
 
+class SilentOnTypes(socketserver.StreamRequestHandler):
+    """Answers every read of registers with 20.0 C, but says nothing at all to one of the type codes."""
+
+    def handle(self):
+        while header := self.rfile.read(7):
+            transaction, _, length, unit = struct.unpack(">HHHB", header)
+            function, first, count = struct.unpack(">BHH", self.rfile.read(length - 1))
+            if first >= 100:
+                continue
+            body = struct.pack(">BBB", unit, function, 2 * count) + struct.pack(">H", 200) * count
+            self.wfile.write(struct.pack(">HHH", transaction, 0, len(body)) + body)
+
+
+def types_that_nobody_tells_are_said_once_and_trusted_late():
+    with scratch() as folder, socketserver.ThreadingTCPServer(("127.0.0.1", 0), SilentOnTypes) as server:
+        server.daemon_threads = True
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        line = {"transport": "tcp", "host": "127.0.0.1", "port": server.server_address[1], "response_timeout_ms": 100}
+        config = configuration(folder, line, units=((1, 8),), profile="mb8art", test={"period_s": 3.0}, identification={"every_s": 3600.0})
+        with Daemon(folder, config) as daemon:
+            daemon.wait_for("status", lambda s: s["test"] and s["test"]["scans"] >= 6, "scans")
+            said = daemon.log_text().count("its type codes cannot be read")
+        server.shutdown()
+        with database(folder) as stored:
+            quality = [row[0] for row in stored.execute("SELECT quality FROM samples WHERE channel = 0 ORDER BY scan")]
+        assert said == 1, said
+        assert quality[:2] == ["communication"] * 2 and set(quality[2:]) == {"good"}, quality
+
+
 if __name__ == "__main__":
-    run([a_frozen_unit_of_three_is_noticed_and_comes_back, inputs_set_to_another_sensor_are_marked])
+    run([a_frozen_unit_of_three_is_noticed_and_comes_back, inputs_set_to_another_sensor_are_marked,
+         types_that_nobody_tells_are_said_once_and_trusted_late])

@@ -101,6 +101,21 @@ TEST_F(StoreQueueTest, ALockOfAnotherProgramIsWaitedForAndThenHeldInMemory) {
     EXPECT_EQ(stored(), 3U);
 }
 
+TEST_F(StoreQueueTest, MissedScansWaitForWhatComesNext) {
+    for (std::int64_t scan = 0; scan < 300; ++scan) {
+        ScanRecord missed = scan_record(scan);
+        missed.status = ScanStatus::missed;
+        missed.started_ns.reset();
+        missed.finished_ns.reset();
+        missed.samples.clear();
+        queue.append_scan(id, std::move(missed));
+    }
+    EXPECT_EQ(stored(), 0U);
+    EXPECT_EQ(queue.unstored_scans(), 0U) << "nothing of a missed scan can be lost";
+    queue.append_scan(id, scan_record(300));
+    EXPECT_EQ(stored(), 301U);
+}
+
 TEST_F(StoreQueueTest, ARefusedScanHoldsUpNothingAndIsTriedAgain) {
     append(0);
     Direct other(folder / "thermbal.db");

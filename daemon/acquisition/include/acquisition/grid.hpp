@@ -1,8 +1,13 @@
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 namespace thermbal {
+
+inline std::int64_t period_ns_of(double period_s) {
+    return std::llround(period_s * 1e9);
+}
 
 /// The scans of a test: scan k is due at start_ns + k * period_ns of the monotonic clock, whatever happened
 /// to scan k - 1. Nothing accumulates, so the grid does not drift.

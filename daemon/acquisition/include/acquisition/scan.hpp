@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -52,9 +53,11 @@ class ScanAssembler {
     /// dropped.
     void add(LineScan reading);
 
-    /// The scans that are complete now: read by all lines, or with their period over at now_ns. wall_ns is
-    /// the wall time at now_ns (missed scans are stamped with the wall time of their due moment).
-    std::vector<Scan> take_closed(std::int64_t now_ns, std::int64_t wall_ns);
+    /// The scans that are complete now, the oldest `most` of them: read by all lines, or with their period
+    /// over at now_ns. wall_ns is the wall time at now_ns (missed scans are stamped with the wall time of
+    /// their due moment).
+    std::vector<Scan> take_closed(std::int64_t now_ns, std::int64_t wall_ns,
+                                  std::size_t most = std::numeric_limits<std::size_t>::max());
 
     /// When the oldest open scan is closed at the latest.
     std::int64_t next_close_ns() const { return grid_.due_ns(next_ + 1); }

@@ -94,7 +94,7 @@ class Store {
     Result<std::int64_t> record_event(const EventRecord& event);
     Result<std::int64_t> record_archive(const ArchiveRecord& archive);
 
-    /// Moves a test on, as TestState allows; `reason` is kept for stopped and aborted. When it ends, the WAL
+    /// Moves a test on, as TestState allows, and keeps the reason. When it ends, the WAL
     /// is truncated, so that the file alone holds the test.
     Result<void> set_state(TestId id, TestState state, Moment now, std::string_view reason);
 

@@ -36,6 +36,7 @@ class StoreQueue {
 
     explicit StoreQueue(Store store, StoreQueueLimits limits = {});
 
+    /// A missed scan holds nothing that could be lost: it is written with what comes next, or by flush().
     void append_scan(TestId id, ScanRecord scan);
     /// A write of any kind. With a key, it takes the place of one that waits with the same key: of what is
     /// only of interest in its newest state, an outage keeps only that.
