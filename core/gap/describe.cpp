@@ -127,8 +127,10 @@ Result<std::vector<FoundEffect>> describe_effects(const Evidence& evidence, cons
         if (one.in_doubt) one.probability = std::clamp(one.probability, relative_low, relative_high);
         one.effect.provenance = {options.found_on, one.probability, ""};
         for (std::size_t p = 0; p < one.effect.parameters.size() && p < one.parameters.size(); ++p) {
-            one.effect.parameters[p].sigma = one.parameters[p].sigma;
-            if (one.parameters[p].at_bound) one.parameters[p].value = one.effect.parameters[p].value;
+            CalibratedParameter& described = one.parameters[p];
+            EffectParameter& in_file = one.effect.parameters[p];
+            in_file.sigma = sigma_in_unit(described.parameter.logarithmic, in_file.value, described.sigma);
+            if (described.at_bound) described.value = in_file.value;
         }
         one.experiments = experiments_against(evidence, search, k, one.alternatives);
         one.rmse_before_C = root_mean_square(before.fit.point.difference_C);

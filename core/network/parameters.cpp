@@ -114,6 +114,10 @@ void set_parameter_values(Model& model, std::span<const double> values) {
         [&](std::size_t, EffectParameter& parameter) { parameter.value = values[next++]; });
 }
 
+double sigma_in_unit(bool logarithmic, double value, double coordinate_sigma) {
+    return logarithmic ? value * relative_from_log(coordinate_sigma) : coordinate_sigma;
+}
+
 void set_parameter_sigmas(Model& model, std::span<const double> coordinate_sigmas) {
     constexpr double least = 1e-6;  // 0 would mean: known exactly
     std::size_t next = 0;
@@ -125,8 +129,7 @@ void set_parameter_sigmas(Model& model, std::span<const double> coordinate_sigma
             const EffectForm& form = form_of(model.effects[effect]);
             const auto definition =
                 std::ranges::find(form.parameters, parameter.name, &EffectParameterDefinition::name);
-            const double own = sigma();
-            parameter.sigma = definition->logarithmic ? parameter.value * relative_from_log(own) : own;
+            parameter.sigma = sigma_in_unit(definition->logarithmic, parameter.value, sigma());
         });
 }
 

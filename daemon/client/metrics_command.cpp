@@ -6,6 +6,7 @@
 
 #include "ask.hpp"
 #include "commands.hpp"
+#include "dashboard/exclusive_port.hpp"
 #include "files.hpp"
 #include "metrics.hpp"
 #include "output.hpp"
@@ -88,12 +89,14 @@ int serve_metrics(const MetricsFlags& flags) {
     const auto address = loopback_address(flags.listen);
     if (!address) return report_error(address.error());
     httplib::Server server;
+    server.set_socket_options(keep_port_alone);
     server.Get("/metrics", [&](const httplib::Request&, httplib::Response& response) {
         response.set_content(ask_for_metrics(flags.socket).value_or(prometheus_text_of_nobody()),
                              "text/plain; version=0.0.4");
     });
     if (server.listen(address->host, address->port)) return 0;
-    return report_error({NextStep::stop, fmt::format("{}: cannot be listened on", flags.listen)});
+    return report_error(
+        {NextStep::stop, fmt::format("{}: cannot listen there; is something else on it?", flags.listen)});
 }
 
 }  // namespace

@@ -224,6 +224,11 @@ Result<NewConfiguration> configuration_of(const NewFlags& flags, bool ask) {
     const auto inputs = flags.probe ? look_at_the_module(flags, wanted) : units_as_told(flags, wanted);
     if (!inputs) return std::unexpected(inputs.error());
     wanted.channels = channels_of_inputs(*inputs, flags.channels, flags.ambient);
+    const bool room_is_measured = !flags.ambient.empty() && flags.ambient != "none";
+    if (room_is_measured && std::ranges::none_of(wanted.channels, &NewConfiguration::Channel::ambient)) {
+        return refuse(fmt::format("--ambient: no channel is named \"{}\"; accepted: T1 to T{}, or none",
+                                  flags.ambient, wanted.channels.size()));
+    }
     if (ask) {
         if (auto asked = ask_for_channels(wanted, flags); !asked) return std::unexpected(asked.error());
     }

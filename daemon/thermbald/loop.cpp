@@ -168,6 +168,13 @@ Result<void> Daemon::attach() {
             return added;
         }
     }
+    // Somebody's terminal that closes, or who expects it to read the configuration again: a test goes on.
+    const auto go_on = [](sd_event_source*, const signalfd_siginfo*, void*) {
+        spdlog::warn("SIGHUP: measuring goes on; a changed configuration is read at the next start");
+        return 0;
+    };
+    if (auto added = check(sd_event_add_signal(loop_, nullptr, SIGHUP, go_on, nullptr), "signals"); !added)
+        return added;
     add_methods();
     return {};
 }

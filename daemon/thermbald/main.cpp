@@ -64,7 +64,7 @@ std::pair<std::unique_ptr<Clock>, std::string> make_clock(const Flags& flags) {
 void leave_signals_to_the_loop() {
     sigset_t signals;
     sigemptyset(&signals);
-    for (const int signal : {SIGTERM, SIGINT}) sigaddset(&signals, signal);
+    for (const int signal : {SIGTERM, SIGINT, SIGHUP}) sigaddset(&signals, signal);
     pthread_sigmask(SIG_BLOCK, &signals, nullptr);
     std::signal(SIGPIPE, SIG_IGN);  // NOLINT(concurrency-mt-unsafe): no other thread yet
     // A limit on the size of files is a failed write, not the end of the measurement.

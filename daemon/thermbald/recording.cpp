@@ -1,4 +1,7 @@
+#include <algorithm>
+#include <array>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
@@ -7,6 +10,21 @@
 #include "daemon.hpp"
 
 namespace thermbal {
+
+namespace {
+
+/// A log that is kept to warnings still says what somebody has to see to.
+spdlog::level::level_enum level_of(std::string_view kind) {
+    static constexpr std::array errors = {"alarm", "aborted", "stop_failed"};
+    static constexpr std::array warnings = {"line_trouble",       "frozen",       "storage_away",
+                                            "storage_refused",    "scans_missed", "clock_step",
+                                            "database_set_aside", "held",         "model_failed",
+                                            "archive_unread",     "suspended",    "database_unchecked"};
+    if (std::ranges::find(errors, kind) != errors.end()) return spdlog::level::err;
+    return std::ranges::find(warnings, kind) != warnings.end() ? spdlog::level::warn : spdlog::level::info;
+}
+
+}  // namespace
 
 Moment Daemon::now() const {
     return {clock_.wall_ns(), clock_.monotonic_ns()};
@@ -109,7 +127,7 @@ void Daemon::event(std::string_view kind, const std::string& message,
                        .message = message};
     if (record.test_id)
         record.time_s = static_cast<double>(clock_.monotonic_ns() - test_.grid.start_ns) * 1e-9;
-    spdlog::info("{}: {}", kind, message);
+    spdlog::log(level_of(kind), "{}: {}", kind, message);
     // Shared with a write that may happen long after this call; 0 until then.
     const auto id = std::make_shared<std::int64_t>(0);
     write([record, id](Store& store) -> Result<void> {

@@ -93,7 +93,9 @@ class Metrics(DaemonCase):
                 with urllib.request.urlopen(f"http://127.0.0.1:{port}/metrics", timeout=5) as reply:
                     self.assertIn("version=0.0.4", reply.headers["Content-Type"])
                     self.check(reply.read().decode())
-                    return
+                second = run("metrics", "--socket", self.socket, "--listen", f"127.0.0.1:{port}")
+                self.assertEqual((second.returncode, "something else" in second.stderr), (1, True), second.stderr)
+                return
             except ConnectionError:
                 time.sleep(0.05)
             except urllib.error.URLError:

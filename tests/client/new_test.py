@@ -48,6 +48,11 @@ class New(unittest.TestCase):
         self.assertEqual(config["channel"][2]["place"], 'a "b" \\ c')
         self.assertGreater((self.folder / "thermbald.toml").read_text(encoding="utf-8").count("# "), 8)
 
+    def test_an_ambient_that_is_no_channel_is_refused(self):
+        for name in ("T9", "t1", "room"):
+            made = run(self.folder, "--tcp", "h", "--profile", "mb8art", "--channels", "3", "--ambient", name, "--out", "e.toml")
+            self.assertEqual((made.returncode, f'"{name}"; accepted: T1 to T3' in made.stderr), (2, True), made.stderr)
+
     def test_a_serial_line_with_two_modules(self):
         made = run(self.folder, "--rtu", "/dev/ttyUSB0", "--baud", "19200", "--parity", "E", "--unit", "3", "--unit", "7",
                    "--profile", "generic-8x-int16", "--ambient", "none", "--out", "two.toml")

@@ -16,8 +16,10 @@ def aborted_by(alarm, expected):
                                identification={"every_s": 3600.0}, stop={"action": "command", "command": [str(script)]})
         with open(config, "a", encoding="utf-8") as file:
             file.write("\n[[alarm]]\n" + alarm)
+            file.write('\n[log]\nlevel = "error"\n')
         with Daemon(folder, config, "--lockstep", "--exit-when-ended") as daemon:
             assert daemon.wait_ended(90) == 0, daemon.log_text()
+            assert "error: alarm" in daemon.log_text(), "whatever the log is kept to, it says this"
         with sqlite3.connect(f"file:{folder}/test.db?mode=ro", uri=True) as stored:
             state, reason = stored.execute("SELECT state, stop_reason FROM tests").fetchone()
             channel, message = stored.execute("SELECT channel, message FROM events WHERE kind = 'alarm'").fetchone()

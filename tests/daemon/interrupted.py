@@ -107,6 +107,9 @@ def hours_without_a_daemon_are_missed_scans_and_soon_written():
     with scratch() as folder, Simulator() as sim:
         config = configuration(folder, line_of(sim), identification=LATER)
         with Daemon(folder, config) as daemon:
+            daemon.wait_for("status", lambda s: s["test"] and s["test"]["scans"] >= 1, "a scan")
+            daemon.process.send_signal(signal.SIGHUP)  # a terminal that closes
+            wait_until(lambda: "measuring goes on" in daemon.log_text(), "the signal")
             killed_after(daemon, 1)
         moved_back(folder, 8 * 3600)
         began = time.monotonic()
@@ -146,7 +149,7 @@ def a_stop_that_was_under_way_is_begun_again_until_it_succeeds():
         tries, told = pathlib.Path(folder) / "tries", pathlib.Path(folder) / "told"
         # The first one hangs, as a gateway does that is being switched on; two fail.
         config = stopping(folder, sim, f"""echo x >> {tries}
-            case $(wc -l < {tries}) in 1) exec sleep 100;; 2|3) exit 1;; esac
+            case $(wc -l < {tries}) in 1) exec sleep 30;; 2|3) exit 1;; esac
             echo "$THERMBAL_REASON" > {told}""")
         with Daemon(folder, config, "--lockstep") as daemon:
             wait_until(tries.exists, "the stop command", 240)

@@ -47,6 +47,10 @@ TEST(Diagnose, FindsHeatThatSetsIn) {
     EXPECT_GT(found.probability, 0.9);
     EXPECT_LT(diagnosis->run.after_rmse_C, 0.056);
     EXPECT_FALSE(diagnosis->disagreements.empty());
+    // What is written says in watts how well it is known; the fit says it of the logarithm.
+    const CalibratedParameter& fitted = found.parameters.front();
+    ASSERT_TRUE(fitted.parameter.logarithmic);
+    EXPECT_NEAR(found.effect.parameters.front().sigma, 25.0 * fitted.sigma, 0.2 * 25.0 * fitted.sigma);
 }
 
 /// A minute after the spindle stops.

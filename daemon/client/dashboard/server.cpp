@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <httplib.h>
 
+#include "exclusive_port.hpp"
 #include "report/assets.hpp"
 
 namespace thermbal {
@@ -155,6 +156,7 @@ Result<DashboardServer> DashboardServer::open(const DashboardOptions& options, L
         [raw = parts.get()](const httplib::Request& request, httplib::Response& response) {
             return raw->admit(request, response);
         });
+    server.set_socket_options(keep_port_alone);
     parts->serve_assets();
     parts->serve_live();
     const auto& [host, port] = options.address;

@@ -45,6 +45,9 @@ std::vector<Parameter> parameters_of(const Model& model);
 /// sigmas stay.
 void set_parameter_values(Model& model, std::span<const double> values);
 
+/// A standard deviation of the fitted coordinate as one in the number's own unit, at this value.
+double sigma_in_unit(bool logarithmic, double value, double coordinate_sigma);
+
 /// States how well each number is known, as standard deviations in the fitted coordinates: relative_sigma for
 /// the base network, sigma for effects. What a calibration leaves behind in its model.
 void set_parameter_sigmas(Model& model, std::span<const double> coordinate_sigmas);
