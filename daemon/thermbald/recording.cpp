@@ -24,6 +24,13 @@ spdlog::level::level_enum level_of(std::string_view kind) {
     return std::ranges::find(warnings, kind) != warnings.end() ? spdlog::level::warn : spdlog::level::info;
 }
 
+/// What a person wrote makes no further lines of the log.
+std::string as_one_line(std::string text) {
+    std::ranges::replace_if(
+        text, [](unsigned char character) { return character < ' ' || character == 0x7f; }, ' ');
+    return text;
+}
+
 }  // namespace
 
 Moment Daemon::now() const {
@@ -127,7 +134,7 @@ void Daemon::event(std::string_view kind, const std::string& message,
                        .message = message};
     if (record.test_id)
         record.time_s = static_cast<double>(clock_.monotonic_ns() - test_.grid.start_ns) * 1e-9;
-    spdlog::log(level_of(kind), "{}: {}", kind, message);
+    spdlog::log(level_of(kind), "{}: {}", kind, as_one_line(message));
     // Shared with a write that may happen long after this call; 0 until then.
     const auto id = std::make_shared<std::int64_t>(0);
     write([record, id](Store& store) -> Result<void> {

@@ -23,6 +23,14 @@ Result<std::string> text_param(const json& params, const char* key) {
     return found->get<std::string>();
 }
 
+/// The name of a configured channel; empty when it is not given.
+Result<std::string> channel_param(const json& params, const std::vector<ChannelConfig>& channels) {
+    auto name = text_param(params, "channel");
+    if (name && !name->empty() && std::ranges::find(channels, *name, &ChannelConfig::name) == channels.end())
+        return fail(NextStep::refuse_input, fmt::format("channel: there is no {}", *name));
+    return name;
+}
+
 Result<std::int64_t> integer_param(const json& params, const char* key, std::int64_t otherwise) {
     const auto found = params.find(key);
     if (found == params.end() || found->is_null()) return otherwise;
@@ -237,12 +245,9 @@ Result<json> Daemon::samples_json(const json& params) const {
     if (!from_scan) return std::unexpected(from_scan.error());
     const auto limit = integer_param(params, "limit", 2000);
     if (!limit || *limit < 1 || *limit > 10'000) return bad_param("limit: expected 1 to 10000 scans");
-    const auto wanted = text_param(params, "channel");
-    if (!wanted) return std::unexpected(wanted.error());
     const auto& channels = options_.config.channels;
-    if (!wanted->empty() && std::ranges::find(channels, *wanted, &ChannelConfig::name) == channels.end()) {
-        return bad_param(fmt::format("channel: there is no {}", *wanted));
-    }
+    const auto wanted = channel_param(params, channels);
+    if (!wanted) return std::unexpected(wanted.error());
     const std::int64_t first = std::clamp<std::int64_t>(*from_scan, 0, std::int64_t{1} << 40);
     const auto scans = storage_.store().read().scans(
         test_.id, first, first + std::min(*limit, most_scans(channels.size())) - 1);
@@ -264,7 +269,7 @@ Result<json> Daemon::samples_json(const json& params) const {
 }
 
 Result<json> Daemon::curve_json(const json& params) const {
-    const auto channel = text_param(params, "channel");
+    const auto channel = channel_param(params, options_.config.channels);
     if (!channel) return std::unexpected(channel.error());
     json curves = json::array();
     for (const ChannelVerdict& verdict : test_.declarations.standing()) {
@@ -381,7 +386,7 @@ Result<json> Daemon::on_annotate(const json& params) {
     const auto message = text_param(params, "message");
     if (!message) return std::unexpected(message.error());
     if (message->empty()) return bad_param("message: expected a text");
-    const auto channel = text_param(params, "channel");
+    const auto channel = channel_param(params, options_.config.channels);
     if (!channel) return std::unexpected(channel.error());
     event("annotation", *message, channel->empty() ? std::nullopt : std::optional(*channel));
     return json{{"test", test_.id}};

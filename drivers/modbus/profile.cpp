@@ -165,13 +165,23 @@ std::string check_profile(const ModuleProfile& profile) {
     return {};
 }
 
+namespace {
+
+/// 304 tenths are the double 30.4, which 304 * 0.1 is not.
+double scaled(double number, double scale) {
+    const double per_unit = std::round(1.0 / scale);
+    return per_unit * scale == 1.0 ? number / per_unit : number * scale;
+}
+
+}  // namespace
+
 Sample decode(const ModuleProfile& profile, std::span<const std::uint16_t> registers) {
     Sample sample{.raw = std::nullopt, .value_C = no_value, .quality = Quality::communication};
     const auto width = static_cast<std::size_t>(registers_per_value(profile.type));
     if (registers.size() < width) return sample;
     sample.raw = width == 1 ? registers[0] : join(registers[0], registers[1]);
     const double number = number_of(profile.type, value_bits(profile, registers));
-    const double value_C = number * profile.scale + profile.offset_C;
+    const double value_C = scaled(number, profile.scale) + profile.offset_C;
     sample.quality = quality_of(profile, number, value_C);
     if (sample.quality == Quality::good) sample.value_C = value_C;
     return sample;

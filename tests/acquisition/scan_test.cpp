@@ -23,6 +23,7 @@ TEST(Grid, DoesNotDrift) {
     EXPECT_EQ(grid.scan_at(100 * s - 1), -1);
     EXPECT_EQ(grid.scan_at(100 * s), 0);
     EXPECT_EQ(grid.scan_at(grid.due_ns(7) - 1), 6);
+    EXPECT_EQ(grid.time_s(122), 1830.0) << "whole seconds are whole";
 }
 
 TEST(ScanAssembler, ClosesAScanWhenEveryLineHasReadIt) {

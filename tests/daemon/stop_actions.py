@@ -97,8 +97,11 @@ def by_hand_and_only_when_there_is_a_test():
                 assert "no test is running" in str(refused)
             assert daemon.call("start_test", name="by hand")["test"] == 1
             daemon.wait_for("status", lambda s: s["test"]["scans"] >= 3, "scans")
-            assert daemon.call("stop_test", reason="coolant leak", abort=True)["state"] == "aborted"
-        assert tuple(end_of(folder)) == ("aborted", "coolant leak")
+            for method, more in (("annotate", {"message": "loose"}), ("curve", {}), ("samples", {})):
+                assert "there is no T99" in daemon.answer(method, channel="T99", **more), method
+            assert daemon.call("stop_test", reason="coolant\nleak", abort=True)["state"] == "aborted"
+            assert "aborted: coolant leak\n" in daemon.log_text(), "one event, one line"
+        assert tuple(end_of(folder)) == ("aborted", "coolant\nleak")
 
 
 def the_longest_duration_aborts():

@@ -37,6 +37,7 @@ TEST(Decode, Sixteen) {
     const ModuleProfile tenths = profile_of(RegisterType::int16, ByteOrder::abcd, 0.1);
     expect_good(tenths, {0x00FA}, 25.0, 0x00FA);
     expect_good(tenths, {0xFF38}, -20.0, 0xFF38);
+    EXPECT_EQ(decode(tenths, Words{304}).value_C, 30.4) << "which 304 * 0.1 is not";
     expect_good(profile_of(RegisterType::int16, ByteOrder::badc, 0.1), {0xFA00}, 25.0, 0xFA00);
     expect_good(profile_of(RegisterType::uint16, ByteOrder::abcd, 0.01), {0x8000}, 327.68, 0x8000);
 }

@@ -23,7 +23,7 @@ struct Grid {
         return since >= 0 ? since / period_ns : -((-since + period_ns - 1) / period_ns);
     }
     double time_s(std::int64_t scan) const {
-        return static_cast<double>(scan) * static_cast<double>(period_ns) * 1e-9;
+        return static_cast<double>(scan * period_ns) / 1e9;  // 15, not 15.000000000000002
     }
 };
 
