@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -151,7 +152,9 @@ namespace {
 
 std::string uri_of(const std::filesystem::path& path, OpenMode mode) {
     std::string uri = "file:";
-    for (const char c : std::filesystem::absolute(path).string()) {
+    std::error_code error;
+    const auto absolute = std::filesystem::absolute(path, error);
+    for (const char c : error ? path.string() : absolute.string()) {
         if (c == '?' || c == '#' || c == '%')
             uri += fmt::format("%{:02X}", static_cast<unsigned>(c));
         else

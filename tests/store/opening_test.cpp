@@ -382,6 +382,21 @@ TEST_F(OpeningTest, WhereNoNewDatabaseCanBeMadeTheOldOneStays) {
     EXPECT_EQ(store.read().scans(id)->size(), 2U);
 }
 
+TEST_F(OpeningTest, WhatTheFileSystemDoesNotAnswerIsAnErrorAndTheOldOneStays) {
+    // With what is appended to it, the name is too long to be looked for.
+    path = folder / std::string(240, 'd').c_str();
+    auto store = open_store(path);
+    const auto id = *store.begin_test(test_record());
+    ASSERT_OK(store.append_scan(id, scan_record(0)));
+    const auto aside =
+        store.begin_anew({.id = id, .record = test_record(), .reason = {}, .before_scan = 1}, start);
+    ASSERT_FALSE(aside);
+    EXPECT_EQ(aside.error().next, NextStep::retry);
+    EXPECT_THAT(aside.error().message, HasSubstr("cannot be looked at"));
+    ASSERT_OK(store.append_scan(id, scan_record(1)));
+    EXPECT_EQ(store.read().scans(id)->size(), 2U);
+}
+
 TEST_F(OpeningTest, OtherProgramsReadIt) {
     auto store = open_store(path);
     const auto id = store.begin_test(test_record());
