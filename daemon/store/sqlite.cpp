@@ -12,25 +12,20 @@ namespace thermbal::sqlite {
 
 namespace {
 
+/// Only what SQLite itself calls damage is damage. Everything else may be in order again at a later call: the
+/// disk, a lock, also a table that another program altered.
 NextStep next_step(int code) {
     switch (code & 0xff) {
-        case SQLITE_BUSY:
-        case SQLITE_LOCKED:
-        case SQLITE_FULL:
-        case SQLITE_IOERR:
-        case SQLITE_READONLY:
-        case SQLITE_CANTOPEN:
-        case SQLITE_NOMEM:
-        case SQLITE_INTERRUPT:
-        case SQLITE_PROTOCOL:
-            return NextStep::retry;
+        case SQLITE_CORRUPT:
+        case SQLITE_NOTADB:
+            return NextStep::stop;
         case SQLITE_CONSTRAINT:
         case SQLITE_MISMATCH:
         case SQLITE_TOOBIG:
         case SQLITE_RANGE:
             return NextStep::refuse_input;
         default:
-            return NextStep::stop;
+            return NextStep::retry;
     }
 }
 
@@ -48,6 +43,9 @@ std::string_view what_to_do(int code) {
         case SQLITE_CORRUPT:
         case SQLITE_NOTADB:
             return "; the file is damaged: keep it aside and try `sqlite3 FILE .recover`";
+        case SQLITE_ERROR:
+        case SQLITE_SCHEMA:
+            return "; if another program altered its tables, undo that";
         default:
             return "";
     }

@@ -101,6 +101,23 @@ TEST_F(StoreQueueTest, ALockOfAnotherProgramIsWaitedForAndThenHeldInMemory) {
     EXPECT_EQ(stored(), 3U);
 }
 
+TEST_F(StoreQueueTest, ATableThatAnotherProgramAlteredIsNoDamage) {
+    append(0);
+    Direct other(folder / "thermbal.db");
+    ASSERT_EQ(other.run("ALTER TABLE samples RENAME TO mine"), SQLITE_OK) << other.message();
+    append(1);
+    append(2);
+    EXPECT_FALSE(queue.damaged());
+    EXPECT_THAT(news(), ::testing::ElementsAre(StorageNews::Kind::away));
+    EXPECT_THAT(queue.problem(), HasSubstr("another program"));
+    EXPECT_EQ(queue.unstored_scans(), 2U);
+    ASSERT_EQ(other.run("ALTER TABLE mine RENAME TO samples"), SQLITE_OK) << other.message();
+    append(3);
+    EXPECT_EQ(queue.unstored_scans(), 0U);
+    EXPECT_EQ(stored(), 4U);
+    EXPECT_THAT(findings_text(*queue.store().read().verify()), IsEmpty());
+}
+
 TEST_F(StoreQueueTest, ARefusedScanHoldsUpNothingAndIsTriedAgain) {
     append(0);
     Direct other(folder / "thermbal.db");

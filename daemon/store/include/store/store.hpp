@@ -44,7 +44,7 @@ struct KnownTest {
 /// transaction and returns after it is on the disk. One thread at a time.
 ///
 /// Errors: `retry` when nothing was written and the same call may succeed later (locked, full, I/O error,
-/// read only); `refuse_input` when what was given contradicts what is stored; `stop` when the database is
+/// read only, a table that another program altered); `refuse_input` when what was given contradicts what is stored; `stop` when the database is
 /// damaged. After any error nothing of the call is in the database.
 class Store {
   public:

@@ -28,7 +28,7 @@ struct StorageNews {
 };
 
 /// Writes to a Store in order, and keeps in memory what it does not take at the moment: a full disk, an I/O
-/// error, a read-only remount, a lock of another program. Nothing overtakes what waits. One thread; no call
+/// error, a read-only remount, another program that locks or alters it. Nothing overtakes what waits. One thread; no call
 /// waits for longer than the store's busy timeout.
 class StoreQueue {
   public:
