@@ -51,6 +51,7 @@ void Daemon::leave_damaged_database() {
             .reason = test_.end_reason,
             .before_scan = test_.last_scan + 1};
         known.record.started = {test_.started_wall_ns, test_.grid.start_ns};
+        known.record.period_s = test_.window.period_s;
     } else if (const auto open = storage_.store().read().open_test(); open && *open) {
         known = {.id = (*open)->id,
                  .record = (*open)->record,

@@ -311,6 +311,52 @@ TEST_F(OpeningTest, ANewDatabaseHoldsWhatWasDeclaredAndWhatWasWithdrawn) {
     EXPECT_EQ((*resumed)->identifications[0].verdict_json, "{\"n\":8}");
 }
 
+TEST_F(OpeningTest, WhatIsReadAndCannotBeCountsAsNotReadable) {
+    auto store = open_store(path);
+    const auto id = *store.begin_test(test_record());
+    ASSERT_OK(store.append_scans(id, scan_records(30)));
+    ASSERT_OK(store.record_declaration(id, declaration_of("T5", 10, 24.5)));
+    ASSERT_OK(store.record_declaration(id, declaration_of("T6", 20, 25.5)));
+    for (const char* channel : {"T5", "T6"}) {
+        const IdentificationRecord said{.channel = channel, .window_end_scan = 29};
+        ASSERT_OK(store.record_identifications(id, std::span(&said, 1)));
+    }
+    for (const char* machine : {"VMC 850", "VMC 1000"})
+        ASSERT_OK(store.record_archive({.machine = machine, .test_id = id}));
+    EventRecord door;
+    door.test_id = id;
+    door.kind = "annotation";
+    ASSERT_OK(store.record_event(door));
+    {
+        Direct direct(path);
+        ASSERT_EQ(direct.run("PRAGMA ignore_check_constraints = ON;"
+                             "UPDATE scans SET time_s = 1e9 WHERE scan = 5;"
+                             "UPDATE samples SET value_C = NULL WHERE scan = 7 AND channel = 3;"
+                             "UPDATE declarations SET basis = 'Z' WHERE window_end_scan = 10;"
+                             "UPDATE identifications SET verdict = 'Z' WHERE channel = 4;"
+                             "UPDATE archive SET spectrum = 'Z' WHERE machine = 'VMC 1000';"
+                             "UPDATE events SET kind = '' WHERE id = 1;"),
+                  SQLITE_OK)
+            << direct.message();
+    }
+    ASSERT_OK(store.begin_anew({.id = id, .record = test_record(), .reason = {}, .before_scan = 30}, start));
+    const auto scans = store.read().scans(id);
+    ASSERT_OK(scans);
+    ASSERT_EQ(scans->size(), 30U);
+    for (const ScanRecord& scan : *scans) {
+        const bool missed = scan.scan == 5 || scan.scan == 7;
+        EXPECT_EQ(scan.status, missed ? ScanStatus::missed : ScanStatus::ok) << scan.scan;
+    }
+    const auto resumed = store.resume();
+    ASSERT_OK(resumed);
+    ASSERT_EQ((*resumed)->declarations.size(), 1U);
+    EXPECT_EQ((*resumed)->declarations[0].channel, "T6");
+    ASSERT_EQ((*resumed)->identifications.size(), 1U);
+    EXPECT_EQ((*resumed)->identifications[0].channel, "T6");
+    EXPECT_EQ(store.read().archive("")->size(), 1U);
+    EXPECT_THAT(findings_text(*store.read().verify()), IsEmpty());
+}
+
 /// What the end of the process between the renames of begin_anew leaves: the new one is whole and not in
 /// place yet.
 class NewDatabaseTest : public OpeningTest {

@@ -158,6 +158,49 @@ TEST_F(StoreQueueTest, WhatWaitsIsWrittenBehindWhatCouldBeReadOfADamagedDatabase
     EXPECT_EQ(queue.unstored_scans(), 0U);
 }
 
+TEST_F(StoreQueueTest, WhatWaitsOfATestThatEndedMeanwhileIsStored) {
+    for (std::int64_t scan = 0; scan <= 3; ++scan) append(scan);
+    set_write_fault(WriteFault::io_error);
+    append(4);
+    queue.set_state(id, TestState::running, TestState::declared, start, "all settled");
+    append(5);
+    queue.set_state(id, TestState::declared, TestState::stopped, start, "all settled");
+    set_write_fault(WriteFault::none);
+    ASSERT_TRUE(queue.begin_anew({.id = id,
+                                  .record = test_record(),
+                                  .state = TestState::stopped,
+                                  .reason = "all settled",
+                                  .before_scan = 6},
+                                 start));
+    EXPECT_EQ(queue.refused_writes(), 0U);
+    EXPECT_EQ(queue.unstored_writes(), 0U);
+    EXPECT_THAT(news(), ::testing::ElementsAre(StorageNews::Kind::away, StorageNews::Kind::set_aside,
+                                               StorageNews::Kind::back));
+    const auto test = queue.store().read().test(id);
+    ASSERT_OK(test);
+    EXPECT_EQ(test->state, TestState::stopped);
+    EXPECT_EQ(test->stop_reason, "all settled");
+    EXPECT_EQ(stored(), 6U);
+    EXPECT_THAT(findings_text(*queue.store().read().verify()), IsEmpty());
+}
+
+TEST_F(StoreQueueTest, ATestWhoseDeclarationWaitsIsNotRefusedIt) {
+    append(0);
+    set_write_fault(WriteFault::io_error);
+    append(1);
+    queue.set_state(id, TestState::running, TestState::declared, start, "all settled");
+    set_write_fault(WriteFault::none);
+    ASSERT_TRUE(queue.begin_anew({.id = id,
+                                  .record = test_record(),
+                                  .state = TestState::declared,
+                                  .reason = "all settled",
+                                  .before_scan = 2},
+                                 start));
+    EXPECT_EQ(queue.refused_writes(), 0U);
+    EXPECT_EQ(queue.store().read().test(id)->state, TestState::declared);
+    EXPECT_EQ(stored(), 2U);
+}
+
 TEST_F(StoreQueueTest, OfWhatHasAKeyOnlyTheNewestWaits) {
     set_write_fault(WriteFault::full);
     append(0);

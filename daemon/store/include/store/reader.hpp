@@ -22,8 +22,9 @@ class Database;
 /// Everything that can be asked of a database. Never writes. One thread at a time; several Readers may be
 /// open while the daemon writes, each sees what was committed when its call began.
 ///
-/// Errors: `retry` when the database is locked, altered, or the disk fails at the moment, `stop` when it is damaged,
-/// `refuse_input` when what was asked for is not there or the file is not ours or newer than this program.
+/// Errors: `retry` when the database is locked, altered, or the disk fails at the moment, `stop` when it is
+/// damaged, `refuse_input` when what was asked for is not there or the file is not ours or newer than this
+/// program.
 class Reader {
   public:
     /// Opens an existing database read only (`mode=ro`).

@@ -31,7 +31,8 @@ struct StoreOptions {
     std::uintmax_t checked_at_once_bytes = 4'194'304;
 };
 
-/// What the daemon knows of its latest test without asking the database. id 0: there is none.
+/// What the daemon knows of its latest test without asking the database, as it was given to the database.
+/// id 0: there is none.
 struct KnownTest {
     TestId id = 0;
     TestRecord record;
@@ -44,8 +45,8 @@ struct KnownTest {
 /// transaction and returns after it is on the disk. One thread at a time.
 ///
 /// Errors: `retry` when nothing was written and the same call may succeed later (locked, full, I/O error,
-/// read only, a table that another program altered); `refuse_input` when what was given contradicts what is stored; `stop` when the database is
-/// damaged. After any error nothing of the call is in the database.
+/// read only, a table that another program altered); `refuse_input` when what was given contradicts what is
+/// stored; `stop` when the database is damaged. After any error nothing of the call is in the database.
 class Store {
   public:
     /// Opens or creates the database, brings an older one to this version, and holds it: a second Store on
