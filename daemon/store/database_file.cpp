@@ -10,6 +10,7 @@
 #include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <fmt/chrono.h>
@@ -54,15 +55,23 @@ Result<bool> is_there(const std::filesystem::path& file) {
     return there;
 }
 
-/// The database last: as long as it is in place, the next start sees that it has to follow its log.
+/// The database last: as long as it is in place, the next start sees that it has to follow its log. After an
+/// error each is where it was: a database that is still written needs its log.
 Result<void> rename_with_log(const std::filesystem::path& database, const std::string& target) {
+    std::vector<const char*> renamed;
     for (const char* suffix : {"-wal", "-shm", ""}) {
         std::error_code error;
         std::filesystem::rename(database.string() + suffix, target + suffix, error);
-        if (error && error != std::errc::no_such_file_or_directory)
+        if (!error) {
+            renamed.push_back(suffix);
+        } else if (error != std::errc::no_such_file_or_directory) {
+            std::error_code ignored;
+            for (const char* back : renamed)
+                std::filesystem::rename(target + back, database.string() + back, ignored);
             return fail(NextStep::stop,
                         fmt::format("database {}: damaged, and cannot be renamed to {}: {}",
                                     database.string() + suffix, target + suffix, error.message()));
+        }
     }
     sync_folder(database);
     return {};

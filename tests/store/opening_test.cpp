@@ -15,6 +15,7 @@
 #include "store/file_check.hpp"
 #include "store/store.hpp"
 #include "support.hpp"
+#include "watched_vfs.hpp"
 
 namespace thermbal::test {
 namespace {
@@ -426,6 +427,76 @@ TEST_F(OpeningTest, WhereNoNewDatabaseCanBeMadeTheOldOneStays) {
         store.begin_anew({.id = id, .record = test_record(), .reason = {}, .before_scan = 1}, start));
     ASSERT_OK(store.append_scan(id, scan_record(1)));
     EXPECT_EQ(store.read().scans(id)->size(), 2U);
+}
+
+class UnfinishedMoveTest : public OpeningTest {
+  protected:
+    KnownTest known{.id = 1, .record = test_record(), .reason = {}, .before_scan = 1};
+
+    /// The old one is renamed, and the new one cannot be opened in its place.
+    Store store_with_unfinished_move() {
+        install_watched_vfs();
+        auto store = open_store(path);
+        EXPECT_EQ(store.begin_test(test_record()), 1);
+        EXPECT_TRUE(store.append_scan(1, scan_record(0)));
+        refuse_to_open(path.filename());
+        EXPECT_FALSE(store.begin_anew(known, start));
+        return store;
+    }
+    ~UnfinishedMoveTest() override { refuse_to_open(""); }
+
+    void expect_scans(std::size_t count) const {
+        const auto store = open_store(path);
+        const auto resumed = store.resume();
+        ASSERT_OK(resumed);
+        ASSERT_TRUE(*resumed);
+        EXPECT_EQ(store.read().scans(1)->size(), count);
+        EXPECT_THAT(findings_text(*store.read().verify()), IsEmpty());
+    }
+};
+
+TEST_F(UnfinishedMoveTest, NothingIsWrittenBeforeItIsFinished) {
+    {
+        auto store = store_with_unfinished_move();
+        const auto refused = store.append_scan(1, scan_record(1));
+        ASSERT_FALSE(refused);
+        EXPECT_EQ(refused.error().next, NextStep::retry);
+        EXPECT_THAT(refused.error().message, HasSubstr("set aside"));
+        EXPECT_FALSE(store.record_event({}));
+        EXPECT_FALSE(store.begin_anew(known, start));
+        refuse_to_open("");
+        const auto aside = store.begin_anew(known, start);
+        ASSERT_OK(aside);
+        EXPECT_TRUE(std::filesystem::exists(*aside));
+        ASSERT_OK(store.append_scan(1, scan_record(1)));
+    }
+    expect_scans(2);
+}
+
+TEST_F(UnfinishedMoveTest, IsFinishedByTheNextStart) {
+    {
+        const auto store = store_with_unfinished_move();
+    }
+    refuse_to_open("");
+    expect_scans(1);
+}
+
+TEST_F(OpeningTest, ADatabaseThatCannotBeRenamedKeepsItsLog) {
+    const std::filesystem::path in_the_way = path.string() + ".damaged-20231114T221320Z-shm";
+    std::filesystem::create_directory(in_the_way);
+    {
+        auto store = open_store(path);
+        ASSERT_OK(store.begin_test(test_record()));
+        ASSERT_OK(store.append_scan(1, scan_record(0)));
+        ASSERT_FALSE(
+            store.begin_anew({.id = 1, .record = test_record(), .reason = {}, .before_scan = 1}, start));
+        ASSERT_OK(store.append_scan(1, scan_record(1)));
+    }
+    std::filesystem::remove(in_the_way);
+    const auto store = open_store(path);
+    EXPECT_FALSE(store.set_aside());
+    ASSERT_TRUE(*store.resume());
+    EXPECT_EQ(store.read().scans(1)->size(), 2U);
 }
 
 TEST_F(OpeningTest, WhatTheFileSystemDoesNotAnswerIsAnErrorAndTheOldOneStays) {

@@ -63,7 +63,8 @@ class Store {
     /// The database turned out to be damaged: it is renamed, and a new one takes its place with the test, of
     /// its scans those that can still be read (the others are missed ones), and what the archive says of the
     /// machines. The test keeps its id. Takes as long as writing the test again. Returns the new name of the
-    /// damaged file. After an error all is as it was before.
+    /// damaged file. After an error all is as it was before; or the damaged file has its new name already:
+    /// then nothing is written (`retry`) until a later call has put the new one in place.
     Result<std::filesystem::path> begin_anew(const KnownTest& known, Moment now);
 
     /// All queries, on this connection.
@@ -115,6 +116,8 @@ class Store {
   private:
     struct Parts;
     explicit Store(std::unique_ptr<Parts> parts);
+    /// The database that is to follow this one, whole and beside it.
+    Result<void> make_successor(const KnownTest& known, Moment now);
     std::unique_ptr<Parts> parts_;
 };
 
