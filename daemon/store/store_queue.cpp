@@ -142,11 +142,11 @@ bool StoreQueue::begin_anew(KnownTest known, Moment now) {
         if (entry.state_before) known.state = *entry.state_before;
     }
     const auto aside = store_.begin_anew(known, now);
+    damaged_ = !aside;
     if (!aside) {
         note_failure(aside.error());
         return false;
     }
-    damaged_ = false;
     news_.push_back(
         {StorageNews::Kind::set_aside,
          fmt::format("the database was damaged; it is kept as {}, and a new one goes on with what "

@@ -141,11 +141,15 @@ TEST_F(StoreQueueTest, WhatWaitsIsWrittenBehindWhatCouldBeReadOfADamagedDatabase
     set_write_fault(WriteFault::io_error);
     for (std::int64_t scan = 4; scan <= 6; ++scan) append(scan);
     const KnownTest known{.id = id, .record = test_record(), .reason = {}, .before_scan = 7};
+    queue.note_damage();
+    EXPECT_TRUE(queue.damaged());
     EXPECT_FALSE(queue.begin_anew(known, start)) << "the disk takes no other file either";
+    EXPECT_TRUE(queue.damaged()) << "to be tried again";
     EXPECT_EQ(queue.unstored_scans(), 3U);
 
     set_write_fault(WriteFault::none);
     EXPECT_TRUE(queue.begin_anew(known, start));
+    EXPECT_FALSE(queue.damaged());
     EXPECT_THAT(news(), ::testing::ElementsAre(StorageNews::Kind::away, StorageNews::Kind::set_aside,
                                                StorageNews::Kind::back));
     const auto scans = queue.store().read().scans(id);
@@ -199,6 +203,17 @@ TEST_F(StoreQueueTest, ATestWhoseDeclarationWaitsIsNotRefusedIt) {
     EXPECT_EQ(queue.refused_writes(), 0U);
     EXPECT_EQ(queue.store().read().test(id)->state, TestState::declared);
     EXPECT_EQ(stored(), 2U);
+}
+
+TEST_F(StoreQueueTest, ADamageWhoseNewDatabaseCannotBeMadeIsTriedAgain) {
+    append(0);
+    set_write_fault(WriteFault::full);
+    EXPECT_FALSE(
+        queue.begin_anew({.id = id, .record = test_record(), .reason = {}, .before_scan = 1}, start));
+    set_write_fault(WriteFault::none);
+    append(1);
+    EXPECT_EQ(stored(), 2U) << "the old one still takes scans";
+    EXPECT_TRUE(queue.damaged());
 }
 
 TEST_F(StoreQueueTest, OfWhatHasAKeyOnlyTheNewestWaits) {

@@ -47,8 +47,11 @@ class StoreQueue {
     /// (Store::begin_anew), as it was before the oldest write that waits here, and with what waits. `known`
     /// is the test with all that was given. True when that was done; else it is to be tried again later.
     bool begin_anew(KnownTest known, Moment now);
-    /// The database said of itself that it is damaged.
+    /// The database said of itself that it is damaged, or note_damage did: begin_anew is due until it
+    /// succeeds.
     bool damaged() const { return damaged_; }
+    /// A look through the file found what no write has met yet.
+    void note_damage() { damaged_ = true; }
 
     /// Tries to write what waits. After a failure the rest waits for the next call: call it once a scan.
     void flush();
