@@ -206,10 +206,6 @@ Result<std::int64_t> Database::integer(std::string_view sql) {
     return value;
 }
 
-void Database::interrupt() {
-    sqlite3_interrupt(handle_);
-}
-
 void Database::set_busy_timeout_ms(int milliseconds) {
     sqlite3_busy_timeout(handle_, milliseconds);
 }
@@ -233,6 +229,22 @@ void Database::leave_wal_alone_on_close() {
 void Database::keep_wal_file() {
     int on = 1;
     sqlite3_file_control(handle_, "main", SQLITE_FCNTL_PERSIST_WAL, &on);
+}
+
+// An interrupt is forgotten by a statement that begins after it, which therefore looks itself; a check of the
+// pages is one step and looks for nothing but the interrupt.
+EndsWhenStopped::EndsWhenStopped(Database& database, std::stop_token stop)
+    : handle_(database.handle_),
+      stop_(std::move(stop)),
+      interrupt_(stop_, [handle = handle_] { sqlite3_interrupt(handle); }) {
+    sqlite3_progress_handler(
+        handle_, 1,
+        [](void* token) { return static_cast<const std::stop_token*>(token)->stop_requested() ? 1 : 0; },
+        &stop_);
+}
+
+EndsWhenStopped::~EndsWhenStopped() {
+    sqlite3_progress_handler(handle_, 0, nullptr, nullptr);
 }
 
 Transaction::Transaction(Database& database, Kind kind)

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <future>
 #include <memory>
+#include <stop_token>
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -218,6 +219,21 @@ TEST_F(OpeningTest, ALargeDatabaseIsOpenedFirstAndCheckedBesideTheScans) {
     const auto spoilt = checked();
     ASSERT_OK(spoilt);
     EXPECT_FALSE(*spoilt);
+}
+
+TEST_F(OpeningTest, ACheckThatIsStoppedBeforeItBeginsEndsAtOnce) {
+    {
+        auto store = open_store(path);
+        ASSERT_OK(store.begin_test(test_record()));
+    }
+    const auto reader = Reader::open(path);
+    ASSERT_OK(reader);
+    std::stop_source stop;
+    stop.request_stop();
+    const auto stopped = reader->is_sound(stop.get_token());
+    ASSERT_FALSE(stopped);
+    EXPECT_EQ(stopped.error().next, NextStep::retry);
+    EXPECT_EQ(*reader->is_sound(), true) << "the next one is not";
 }
 
 TEST_F(OpeningTest, ATestGoesOnInANewDatabaseWithWhatCanBeRead) {
