@@ -34,7 +34,8 @@ ChannelAgreement agreement_of(const std::string& channel, const std::vector<Disa
 
 Result<std::vector<ChannelAgreement>> check_agreement(const Model& model, const RecordedTest& test,
                                                       std::span<const std::string> disagreeing,
-                                                      const AgreementOptions& options) {
+                                                      const AgreementOptions& options,
+                                                      const Cancelled& cancelled) {
     if (const auto valid = validate(model); !valid) return std::unexpected(valid.error());
     std::vector<ChannelAgreement> channels;
     if (length_s(test) < options.least_window_s) return channels;
@@ -42,7 +43,8 @@ Result<std::vector<ChannelAgreement>> check_agreement(const Model& model, const 
     const auto data = make_fit_data(model, test, calibration);
     if (!data) return std::unexpected(data.error());
     const FitProblem problem(*data, model);
-    const auto fit = minimise(problem, {problem.prior_coordinates(), nullptr}, calibration, sequential_for);
+    const auto fit =
+        minimise(problem, {problem.prior_coordinates(), nullptr}, calibration, sequential_for, cancelled);
     if (!fit) return std::unexpected(fit.error());
     const auto found = disagreements_of(*data, fit->point, calibration.fidelity);
     for (const std::string& channel : data->seen.channels) {

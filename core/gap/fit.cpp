@@ -50,12 +50,17 @@ Eigen::MatrixXd gram(const Eigen::MatrixXd& jacobian) {
     return product.selfadjointView<Eigen::Lower>();
 }
 
+Error fit_cancelled() {
+    return {NextStep::stop, "the fit was cancelled"};
+}
+
 /// The Jacobian of a fit and what follows from it. Sensitivities that are known from a fit nearby are taken
 /// as they are; the rest follows the point.
 class Slope {
   public:
-    Slope(const FitProblem& problem, const FitStart& start, const ParallelFor& parallel_for)
-        : problem_(problem), parallel_for_(parallel_for) {
+    Slope(const FitProblem& problem, const FitStart& start, const ParallelFor& parallel_for,
+          const Cancelled& cancelled)
+        : problem_(problem), parallel_for_(parallel_for), cancelled_(cancelled) {
         const Eigen::Index size = problem.dimensions(), nuisances = problem.data().nuisances();
         const Eigen::Index samples = problem.data().seen.reading_C.size();
         jacobian_ = Eigen::MatrixXd::Zero(samples + size, size);
@@ -78,6 +83,10 @@ class Slope {
     Result<void> follow(const FitPoint& point) {
         std::vector<std::optional<Error>> failed(moving_.size());
         parallel_for_(moving_.size(), [&](std::size_t k) {
+            if (cancelled_()) {
+                failed[k] = fit_cancelled();
+                return;
+            }
             auto column = problem_.sensitivity(point, moving_[k]);
             if (column)
                 jacobian_.col(moving_[k]) = *column;
@@ -104,6 +113,7 @@ class Slope {
   private:
     const FitProblem& problem_;
     const ParallelFor& parallel_for_;
+    const Cancelled& cancelled_;
     std::vector<Eigen::Index> moving_;
     Eigen::MatrixXd jacobian_, hessian_;
 };
@@ -114,12 +124,13 @@ struct Improvement {
     double promised;
 };
 
-/// Damped until it does; none where no step promises anything. Leaves in `damping` where the next begins.
+/// Damped until it does; none where no step promises anything, or when cancelled. Leaves in `damping` where
+/// the next begins.
 std::optional<Improvement> better_step(const FitProblem& problem, const Slope& slope, const FitPoint& from,
-                                       double& damping, double chi2_tolerance) {
+                                       double& damping, double chi2_tolerance, const Cancelled& cancelled) {
     const Eigen::VectorXd lower = problem.lower(), upper = problem.upper();
     const Eigen::VectorXd gradient = slope.jacobian().transpose() * from.residual;
-    for (int attempt = 0; attempt < 8; ++attempt) {
+    for (int attempt = 0; attempt < 8 && !cancelled(); ++attempt) {
         const Eigen::VectorXd step =
             damped_step(slope.hessian(), gradient, from.coordinates, lower, upper, damping);
         const double promised = -step.dot(2.0 * gradient + slope.hessian() * step);
@@ -137,13 +148,13 @@ std::optional<Improvement> better_step(const FitProblem& problem, const Slope& s
 }  // namespace
 
 Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const CalibrationOptions& options,
-                     const ParallelFor& parallel_for) {
+                     const ParallelFor& parallel_for, const Cancelled& cancelled) {
     constexpr int most_steps_at_once = 8;
     auto first = problem.evaluate(start.coordinates.cwiseMax(problem.lower()).cwiseMin(problem.upper()));
     if (!first) return std::unexpected(first.error());
     Fit fit{{}, problem.parameters(), std::move(*first), {}, {}, 0, false};
     double damping = 1e-3;
-    Slope slope(problem, start, parallel_for);
+    Slope slope(problem, start, parallel_for, cancelled);
     if (auto done = slope.follow(fit.point); !done) return std::unexpected(done.error());
     // Where moments of switching move with everything, more steps go nowhere.
     const int most_iterations =
@@ -153,13 +164,14 @@ Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const Cal
         // Sensitivities cost as much as all coordinates together, a step one simulation: as long as they
         // promise about what happens, further steps are taken with them.
         for (int steps = 0; steps < most_steps_at_once; ++steps) {
-            auto step = better_step(problem, slope, fit.point, damping, options.chi2_tolerance);
+            auto step = better_step(problem, slope, fit.point, damping, options.chi2_tolerance, cancelled);
             const double gained = step ? fit.point.chi2 - step->point.chi2 : 0.0;
             if (steps == 0) fit.converged = gained < options.chi2_tolerance;
             if (!step) break;
             fit.point = std::move(step->point);
             if (gained < options.chi2_tolerance || gained < 0.5 * step->promised) break;
         }
+        if (cancelled()) return std::unexpected(fit_cancelled());
         if (fit.converged) break;
         if (auto done = slope.follow(fit.point); !done) return std::unexpected(done.error());
     }

@@ -133,8 +133,8 @@ struct FitStart {
 };
 
 /// Levenberg-Marquardt within bounds, the sensitivities by `parallel_for`. Errors: those of the simulation at
-/// the start.
+/// the start; stop when cancelled, which is asked before each simulation.
 Result<Fit> minimise(const FitProblem& problem, const FitStart& start, const CalibrationOptions& options,
-                     const ParallelFor& parallel_for);
+                     const ParallelFor& parallel_for, const Cancelled& cancelled = never_cancelled);
 
 }  // namespace thermbal

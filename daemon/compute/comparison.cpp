@@ -25,14 +25,14 @@ Result<std::vector<ChannelComparison>> at_newest_scan(const Model& model, const 
 
 }  // namespace
 
-ComparisonResult compare(const ComparisonJob& job) {
+ComparisonResult compare(const ComparisonJob& job, const Cancelled& cancelled) {
     const auto started = std::chrono::steady_clock::now();
     const RecordedTest test = recording_of(job.window);
     ComparisonResult result{.generation = job.generation,
                             .scan = job.scan,
                             .channels = at_newest_scan(*job.model, test),
                             .agreement = {}};
-    if (job.check) result.agreement = check_agreement(*job.model, test, job.disagreeing);
+    if (job.check) result.agreement = check_agreement(*job.model, test, job.disagreeing, {}, cancelled);
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - started).count();
     return result;
 }

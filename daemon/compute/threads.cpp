@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <memory>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -52,12 +53,20 @@ ParallelFor parallel_on_threads(int threads, bool low_priority) {
         };
         std::vector<std::jthread> helpers;
         const int others = static_cast<int>(std::clamp(count, std::size_t{1}, most)) - 1;
-        // Who has nothing left to begin is idle at once: a body that still runs may have use for a thread.
+        helpers.reserve(static_cast<std::size_t>(others));
         for (int taken = take(*idle, others); taken > 0; --taken) {
-            helpers.emplace_back([&] {
-                work();
-                ++*idle;
-            });
+            try {
+                // Who has nothing left to begin is idle at once: a body that still runs may have use for a
+                // thread.
+                helpers.emplace_back([&] {
+                    work();
+                    ++*idle;
+                });
+            } catch (const std::system_error&) {
+                // The system has no thread left: those there are do all of it.
+                *idle += taken;
+                break;
+            }
         }
         work();
         // Inside a body the thread has more to do after this call, and stays taken.

@@ -154,8 +154,10 @@ Result<void> Publisher::serve(double now_s) {
     if (sent) sent = send_news();
     if (sent) return {};
     if (sent.error().next == NextStep::stop) return sent;
-    // The database is locked or away, or the broker just left: run() or open_database() will find out.
+    // The database is locked or away, or the broker just left: run() or open_database() will find out. Until
+    // then there may always be more to send, for which run() does not wait.
     say_once(sent.error().message);
+    wait_a_turn();
     return {};
 }
 

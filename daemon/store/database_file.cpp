@@ -10,6 +10,7 @@
 #include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <fmt/chrono.h>
@@ -44,15 +45,33 @@ void sync_folder(const std::filesystem::path& file) {
     close(fd);
 }
 
-/// The database last: as long as it is in place, the next start sees that it has to follow its log.
+/// Unlike exists() without an error code, never throws: a disk that fails is no reason to end.
+Result<bool> is_there(const std::filesystem::path& file) {
+    std::error_code error;
+    const bool there = std::filesystem::exists(file, error);
+    if (error)
+        return fail(NextStep::retry, fmt::format("{}: cannot be looked at: {}; check the disk and the folder",
+                                                 file.string(), error.message()));
+    return there;
+}
+
+/// The database last: as long as it is in place, the next start sees that it has to follow its log. After an
+/// error each is where it was: a database that is still written needs its log.
 Result<void> rename_with_log(const std::filesystem::path& database, const std::string& target) {
+    std::vector<const char*> renamed;
     for (const char* suffix : {"-wal", "-shm", ""}) {
         std::error_code error;
         std::filesystem::rename(database.string() + suffix, target + suffix, error);
-        if (error && error != std::errc::no_such_file_or_directory)
+        if (!error) {
+            renamed.push_back(suffix);
+        } else if (error != std::errc::no_such_file_or_directory) {
+            std::error_code ignored;
+            for (const char* back : renamed)
+                std::filesystem::rename(target + back, database.string() + back, ignored);
             return fail(NextStep::stop,
                         fmt::format("database {}: damaged, and cannot be renamed to {}: {}",
                                     database.string() + suffix, target + suffix, error.message()));
+        }
     }
     sync_folder(database);
     return {};
@@ -102,9 +121,10 @@ Result<bool> is_damaged(const std::filesystem::path& database, int busy_timeout_
     if (file.gcount() == 0) return false;
     const bool zeroed = std::all_of(header.begin(), header.end(), [](char c) { return c == 0; });
     // A power cut while the file was made: its rollback journal says how to go back to an empty one.
-    const bool rolls_back = zeroed && std::filesystem::exists(database.string() + "-journal");
-    if (zeroed && !rolls_back) return true;
-    if (!rolls_back && std::memcmp(header.data(), "SQLite format 3", header.size()) != 0)
+    const auto journal = zeroed ? is_there(database.string() + "-journal") : Result<bool>(false);
+    if (!journal) return std::unexpected(journal.error());
+    if (zeroed && !*journal) return true;
+    if (!zeroed && std::memcmp(header.data(), "SQLite format 3", header.size()) != 0)
         return fail(NextStep::refuse_input,
                     fmt::format("database {}: not an SQLite database; name another file", database.string()));
 
@@ -125,7 +145,12 @@ Result<std::filesystem::path> put_aside(const std::filesystem::path& database, M
     const auto seconds = static_cast<std::time_t>(now.wall_ns / 1'000'000'000);
     const auto stem = fmt::format("{}.damaged-{:%Y%m%dT%H%M%SZ}", database.string(), fmt::gmtime(seconds));
     std::string target = stem;
-    for (int i = 2; std::filesystem::exists(target); ++i) target = fmt::format("{}-{}", stem, i);
+    auto taken = is_there(target);
+    for (int i = 2; taken && *taken; ++i) {
+        target = fmt::format("{}-{}", stem, i);
+        taken = is_there(target);
+    }
+    if (!taken) return std::unexpected(taken.error());
     if (auto done = rename_with_log(database, target); !done) return std::unexpected(done.error());
     return std::filesystem::path(target);
 }
@@ -139,7 +164,9 @@ Result<void> finish_put_aside(const std::filesystem::path& database) {
         std::string target = entry->path().string();
         if (!entry->path().filename().string().starts_with(begins) || !target.ends_with(log)) continue;
         target.resize(target.size() - log.size());
-        if (!std::filesystem::exists(target)) return rename_with_log(database, target);
+        const auto there = is_there(target);
+        if (!there) return std::unexpected(there.error());
+        if (!*there) return rename_with_log(database, target);
     }
     return {};
 }
@@ -165,7 +192,10 @@ Result<void> put_in_place_if_due(const std::filesystem::path& database, const st
     std::error_code error;
     const bool whole = std::filesystem::file_size(database, error) > 0 && !error;
     const bool folded_in = std::filesystem::file_size(database.string() + "-wal", error) == 0 || error;
-    if (!whole || !folded_in || std::filesystem::exists(place, error)) return {};
+    if (!whole || !folded_in) return {};
+    const auto taken = is_there(place);
+    if (!taken) return std::unexpected(taken.error());
+    if (*taken) return {};
     return put_in_place(database, place);
 }
 

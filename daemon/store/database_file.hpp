@@ -30,11 +30,12 @@ Result<void> create_if_absent(const std::filesystem::path& database);
 /// SQLite database at all is `refuse_input`: it is probably somebody else's.
 Result<bool> is_damaged(const std::filesystem::path& database, int busy_timeout_ms, bool all);
 
-/// Renames a database with its -wal and -shm to <name>.damaged-<time>; returns the new name.
+/// Renames a database with its -wal and -shm to <name>.damaged-<time>; returns the new name. Errors: `stop`
+/// where it cannot be renamed, `retry` where the disk does not say what is there.
 Result<std::filesystem::path> put_aside(const std::filesystem::path& database, Moment now);
 
 /// What put_aside would have done had the process not ended between its renames: where a log was set aside
-/// without its database, the database follows. Errors (stop) as put_aside.
+/// without its database, the database follows. Errors as put_aside.
 Result<void> finish_put_aside(const std::filesystem::path& database);
 
 /// Removes a database that nobody needs, with all that lies beside it.

@@ -19,8 +19,7 @@ void check(const std::stop_token& stop, const std::filesystem::path& database,
         const bool damaged = reader.error().next == NextStep::stop;
         return done(damaged ? Result<bool>(false) : std::unexpected(reader.error()));
     }
-    const std::stop_callback interrupt(stop, [&reader] { reader->interrupt(); });
-    auto sound = reader->is_sound();
+    auto sound = reader->is_sound(stop);
     if (!stop.stop_requested()) done(std::move(sound));
 }
 

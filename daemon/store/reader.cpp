@@ -144,25 +144,40 @@ void hold_last_value(Column& column) {
     }
 }
 
-/// What recorded_test and window share: the good values of a test in the rows that `row_of(scan)` gives them.
+/// What recorded_test and window share: the good values of a test in the rows that `row_of(scan)` gives them;
+/// a scan that it gives none has values without being a scan (`stop`).
 template <typename RowOf>
 Result<void> fill_columns(sqlite::Database& database, TestId id, std::int64_t until_scan, const RowOf& row_of,
                           std::vector<Column>& channels, std::vector<Column>& inputs) {
+    const auto place_of = [&](Column& column, std::int64_t scan) -> Result<double*> {
+        const std::optional<std::size_t> row = row_of(scan);
+        if (row && *row < column.values.size()) return &column.values[*row];
+        return fail(
+            NextStep::stop,
+            fmt::format("database {}: test {} has values of scan {}, which is not there: damaged; run verify",
+                        database.path().string(), id, scan));
+    };
     auto samples = database.query(
         "SELECT scan, channel, value_C FROM samples WHERE test_id = ? AND scan <= ? AND quality = 'good'", id,
         until_scan);
     while (samples.next()) {
         const auto channel = static_cast<std::size_t>(samples.integer(1));
-        if (channel < channels.size())
-            channels[channel].values.at(row_of(samples.integer(0))) = samples.real(2);
+        if (channel >= channels.size()) continue;
+        const auto place = place_of(channels[channel], samples.integer(0));
+        if (!place) return std::unexpected(place.error());
+        **place = samples.real(2);
     }
     if (auto status = samples.status(); !status) return status;
 
     auto values = database.query("SELECT scan, name, value FROM inputs WHERE test_id = ? AND scan <= ?", id,
                                  until_scan);
-    while (values.next())
-        if (auto* column = find(inputs, values.text(1)))
-            column->values.at(row_of(values.integer(0))) = values.real(2);
+    while (values.next()) {
+        auto* column = find(inputs, values.text(1));
+        if (column == nullptr) continue;
+        const auto place = place_of(*column, values.integer(0));
+        if (!place) return std::unexpected(place.error());
+        **place = values.real(2);
+    }
     return values.status();
 }
 
@@ -281,8 +296,9 @@ Result<RecordedTest> Reader::recorded_test(TestId id) const {
     if (!inputs) return std::unexpected(inputs.error());
     recorded.channels = empty_columns(names_of(test->record.channels), recorded.time_s.size());
     recorded.inputs = empty_columns(*inputs, recorded.time_s.size());
-    const auto row_of = [&](std::int64_t scan) {
+    const auto row_of = [&](std::int64_t scan) -> std::optional<std::size_t> {
         const auto at = std::lower_bound(scan_of_row.begin(), scan_of_row.end(), scan);
+        if (at == scan_of_row.end() || *at != scan) return std::nullopt;
         return static_cast<std::size_t>(at - scan_of_row.begin());
     };
     if (auto filled = fill_columns(*database_, id, INT64_MAX, row_of, recorded.channels, recorded.inputs);
@@ -297,7 +313,7 @@ Result<TestWindow> Reader::window(TestId id, std::int64_t until_scan) const {
     auto test = this->test(id);
     if (!test) return std::unexpected(test.error());
     const std::int64_t last = std::min(test->last_scan.value_or(-1), until_scan);
-    if (last >= most_scans)
+    if (last < -1 || last >= most_scans)
         return fail(NextStep::stop,
                     fmt::format("database {}: test {} has a scan number {}: damaged; run verify",
                                 database_->path().string(), id, last));
@@ -308,7 +324,7 @@ Result<TestWindow> Reader::window(TestId id, std::int64_t until_scan) const {
     window.scans = static_cast<std::size_t>(last + 1);
     window.channels = empty_columns(names_of(test->record.channels), window.scans);
     window.inputs = empty_columns(*inputs, window.scans);
-    const auto row_of = [](std::int64_t scan) { return static_cast<std::size_t>(scan); };
+    const auto row_of = [](std::int64_t scan) { return std::optional(static_cast<std::size_t>(scan)); };
     if (auto filled = fill_columns(*database_, id, last, row_of, window.channels, window.inputs); !filled)
         return std::unexpected(filled.error());
     for (auto& input : window.inputs) hold_last_value(input);

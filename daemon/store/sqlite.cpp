@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,25 +12,20 @@ namespace thermbal::sqlite {
 
 namespace {
 
+/// Only what SQLite itself calls damage is damage. Everything else may be in order again at a later call: the
+/// disk, a lock, also a table that another program altered.
 NextStep next_step(int code) {
     switch (code & 0xff) {
-        case SQLITE_BUSY:
-        case SQLITE_LOCKED:
-        case SQLITE_FULL:
-        case SQLITE_IOERR:
-        case SQLITE_READONLY:
-        case SQLITE_CANTOPEN:
-        case SQLITE_NOMEM:
-        case SQLITE_INTERRUPT:
-        case SQLITE_PROTOCOL:
-            return NextStep::retry;
+        case SQLITE_CORRUPT:
+        case SQLITE_NOTADB:
+            return NextStep::stop;
         case SQLITE_CONSTRAINT:
         case SQLITE_MISMATCH:
         case SQLITE_TOOBIG:
         case SQLITE_RANGE:
             return NextStep::refuse_input;
         default:
-            return NextStep::stop;
+            return NextStep::retry;
     }
 }
 
@@ -47,6 +43,9 @@ std::string_view what_to_do(int code) {
         case SQLITE_CORRUPT:
         case SQLITE_NOTADB:
             return "; the file is damaged: keep it aside and try `sqlite3 FILE .recover`";
+        case SQLITE_ERROR:
+        case SQLITE_SCHEMA:
+            return "; if another program altered its tables, undo that";
         default:
             return "";
     }
@@ -151,7 +150,9 @@ namespace {
 
 std::string uri_of(const std::filesystem::path& path, OpenMode mode) {
     std::string uri = "file:";
-    for (const char c : std::filesystem::absolute(path).string()) {
+    std::error_code error;
+    const auto absolute = std::filesystem::absolute(path, error);
+    for (const char c : error ? path.string() : absolute.string()) {
         if (c == '?' || c == '#' || c == '%')
             uri += fmt::format("%{:02X}", static_cast<unsigned>(c));
         else
@@ -205,10 +206,6 @@ Result<std::int64_t> Database::integer(std::string_view sql) {
     return value;
 }
 
-void Database::interrupt() {
-    sqlite3_interrupt(handle_);
-}
-
 void Database::set_busy_timeout_ms(int milliseconds) {
     sqlite3_busy_timeout(handle_, milliseconds);
 }
@@ -232,6 +229,22 @@ void Database::leave_wal_alone_on_close() {
 void Database::keep_wal_file() {
     int on = 1;
     sqlite3_file_control(handle_, "main", SQLITE_FCNTL_PERSIST_WAL, &on);
+}
+
+// An interrupt is forgotten by a statement that begins after it, which therefore looks itself; a check of the
+// pages is one step and looks for nothing but the interrupt.
+EndsWhenStopped::EndsWhenStopped(Database& database, std::stop_token stop)
+    : handle_(database.handle_),
+      stop_(std::move(stop)),
+      interrupt_(stop_, [handle = handle_] { sqlite3_interrupt(handle); }) {
+    sqlite3_progress_handler(
+        handle_, 1,
+        [](void* token) { return static_cast<const std::stop_token*>(token)->stop_requested() ? 1 : 0; },
+        &stop_);
+}
+
+EndsWhenStopped::~EndsWhenStopped() {
+    sqlite3_progress_handler(handle_, 0, nullptr, nullptr);
 }
 
 Transaction::Transaction(Database& database, Kind kind)

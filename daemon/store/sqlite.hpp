@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
 
@@ -95,8 +97,6 @@ class Database {
     Result<std::int64_t> integer(std::string_view sql);
 
     void set_busy_timeout_ms(int milliseconds);
-    /// Ends the statement under way with an error. Any thread.
-    void interrupt();
     std::int64_t last_insert_id() const;
     std::int64_t changes() const;  ///< rows that the last statement changed
     bool in_transaction() const;
@@ -110,9 +110,25 @@ class Database {
     const std::filesystem::path& path() const { return path_; }
 
   private:
+    friend class EndsWhenStopped;
     Database(sqlite3* handle, std::filesystem::path path) : handle_(handle), path_(std::move(path)) {}
     sqlite3* handle_;
     std::filesystem::path path_;
+};
+
+/// While it lives, the connection's statements end with an error (`retry`) once `stop` is requested, those
+/// too that begin after that.
+class EndsWhenStopped {
+  public:
+    EndsWhenStopped(Database& database, std::stop_token stop);
+    EndsWhenStopped(const EndsWhenStopped&) = delete;
+    EndsWhenStopped& operator=(const EndsWhenStopped&) = delete;
+    ~EndsWhenStopped();
+
+  private:
+    sqlite3* handle_;
+    std::stop_token stop_;
+    std::stop_callback<std::function<void()>> interrupt_;
 };
 
 /// Rolls back unless committed. Inside a transaction that is open already it is part of that one.

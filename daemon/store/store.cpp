@@ -20,6 +20,9 @@ struct Store::Parts {
     std::optional<std::filesystem::path> set_aside;
     int busy_timeout_ms;
     bool checked;
+    /// The damaged file has its new name, this connection still writes it, and the new one is not opened yet:
+    /// what would be written now would be lost.
+    std::optional<Error> unfinished_move = {};
 
     sqlite::Database& database() const { return *reader.database_; }
 };
@@ -38,9 +41,10 @@ constexpr std::string_view insert_input_sql =
     "INSERT INTO inputs (test_id, scan, name, value) VALUES (?, ?, ?, ?)";
 
 /// Begins, calls `body`, commits: all or nothing.
-template <typename Body>
-Result<void> in_transaction(sqlite::Database& database, const Body& body) {
-    Transaction transaction(database, Transaction::Kind::write);
+template <typename Parts, typename Body>
+Result<void> in_transaction(const Parts& parts, const Body& body) {
+    if (parts.unfinished_move) return std::unexpected(*parts.unfinished_move);
+    Transaction transaction(parts.database(), Transaction::Kind::write);
     if (!transaction.begun()) return transaction.begun();
     if (Result<void> done = body(); !done) return done;
     return transaction.commit();
@@ -82,6 +86,12 @@ Result<std::optional<std::filesystem::path>> clear_damage(const std::filesystem:
                     fmt::format("database {}: damaged; move it away, and try `sqlite3 FILE .recover`",
                                 path.string()));
     return put_aside(path, now);
+}
+
+Result<std::shared_ptr<sqlite::Database>> take_place(const std::filesystem::path& fresh,
+                                                     const std::filesystem::path& path, int busy_timeout_ms) {
+    if (auto moved = put_in_place_if_due(fresh, path); !moved) return std::unexpected(moved.error());
+    return open_writing(path, busy_timeout_ms);
 }
 
 /// What is on disk of the test a scan is for.
@@ -243,7 +253,7 @@ Store& Store::operator=(Store&&) noexcept = default;
 Store::~Store() {
     // The log is kept for readers (keep_wal_file): leave it empty. What cannot be folded in now, the next
     // open does.
-    if (parts_) fold_wal(parts_->database());
+    if (parts_ && !parts_->unfinished_move) fold_wal(parts_->database());
 }
 
 Result<Store> Store::open(const std::filesystem::path& path, Moment now, const StoreOptions& options) {
@@ -267,33 +277,46 @@ bool Store::checked() const {
     return parts_->checked;
 }
 
-Result<std::filesystem::path> Store::begin_anew(const KnownTest& known, Moment now) {
-    const std::filesystem::path path = parts_->database().path();
-    const std::filesystem::path fresh_path = beside(path);
+Result<void> Store::make_successor(const KnownTest& known, Moment now) {
+    const std::filesystem::path fresh_path = beside(parts_->database().path());
     remove_database(fresh_path);
     {
-        // Beside the damaged one until it is whole: a full disk or the end of the process changes nothing.
         auto fresh = Store::open(fresh_path, now, {.busy_timeout_ms = parts_->busy_timeout_ms});
         if (!fresh) return std::unexpected(fresh.error());
-        if (auto salvaged = salvage(read(), *fresh, known, now); !salvaged)
-            return std::unexpected(salvaged.error());
+        if (auto salvaged = salvage(read(), *fresh, known, now); !salvaged) return salvaged;
     }
     if (size_of(fresh_path.string() + "-wal") > 0)
         return fail(NextStep::retry,
                     fmt::format("database {}: its log could not be folded in", fresh_path.string()));
-    parts_->database().leave_wal_alone_on_close();
-    auto aside = put_aside(path, now);
-    if (!aside) {
-        // The old one goes on: what is new now would be behind it at the next start.
-        remove_database(fresh_path);
-        return aside;
+    return {};
+}
+
+Result<std::filesystem::path> Store::begin_anew(const KnownTest& known, Moment now) {
+    const std::filesystem::path path = parts_->database().path();
+    if (!parts_->unfinished_move) {
+        // Beside the damaged one until it is whole: a full disk or the end of the process changes nothing.
+        if (auto made = make_successor(known, now); !made) return std::unexpected(made.error());
+        parts_->database().leave_wal_alone_on_close();
+        auto aside = put_aside(path, now);
+        if (!aside) {
+            // The old one goes on: what is new now would be behind it at the next start.
+            remove_database(beside(path));
+            return aside;
+        }
+        parts_->set_aside = *aside;
     }
-    if (auto moved = put_in_place(fresh_path, path); !moved) return std::unexpected(moved.error());
-    auto database = open_writing(path, parts_->busy_timeout_ms);
-    if (!database) return std::unexpected(database.error());
+    auto database = take_place(beside(path), path, parts_->busy_timeout_ms);
+    if (!database) {
+        parts_->unfinished_move = {
+            NextStep::retry,
+            fmt::format(
+                "database {}: the damaged one is set aside as {}, and the new one cannot be opened: {}",
+                path.string(), parts_->set_aside->string(), database.error().message)};
+        return std::unexpected(*parts_->unfinished_move);
+    }
     parts_->reader = Reader(std::move(*database));
-    parts_->set_aside = *aside;
-    return aside;
+    parts_->unfinished_move.reset();
+    return *parts_->set_aside;
 }
 
 const std::optional<std::filesystem::path>& Store::set_aside() const {
@@ -313,7 +336,7 @@ Result<TestId> Store::begin_test(const TestRecord& test, std::optional<TestId> w
                     fmt::format("test {} ({}) is still {}; stop it first", (*open_test)->id,
                                 (*open_test)->record.name, to_string((*open_test)->state)));
     TestId id = 0;
-    auto done = in_transaction(database, [&]() -> Result<void> {
+    auto done = in_transaction(*parts_, [&]() -> Result<void> {
         if (auto inserted =
                 database.run("INSERT INTO tests (id, name, machine, config_toml, version, "
                              "period_s, keep_measuring, state, "
@@ -350,7 +373,7 @@ Result<void> Store::append_scan(TestId id, const ScanRecord& scan) {
 
 Result<void> Store::append_scans(TestId id, std::span<const ScanRecord> scans) {
     auto& database = parts_->database();
-    return in_transaction(database, [&]() -> Result<void> {
+    return in_transaction(*parts_, [&]() -> Result<void> {
         auto context = context_of(database, id);
         if (!context) return std::unexpected(context.error());
         for (const auto& scan : scans) {
@@ -374,7 +397,7 @@ Result<std::int64_t> Store::mark_stuck(TestId id, std::span<const std::size_t> c
                                        std::int64_t first_scan, std::int64_t last_scan) {
     auto& database = parts_->database();
     std::int64_t marked = 0;
-    auto done = in_transaction(database, [&]() -> Result<void> {
+    auto done = in_transaction(*parts_, [&]() -> Result<void> {
         auto update = database.query(
             "UPDATE samples SET quality = 'stuck', value_C = NULL, source_C = NULL WHERE test_id = ? AND "
             "channel = ? "
@@ -393,7 +416,7 @@ Result<std::int64_t> Store::mark_stuck(TestId id, std::span<const std::size_t> c
 
 Result<void> Store::record_declaration(TestId id, const DeclarationRecord& declaration) {
     auto& database = parts_->database();
-    return in_transaction(database, [&]() -> Result<void> {
+    return in_transaction(*parts_, [&]() -> Result<void> {
         if (auto valid = check_json("declaration", declaration.basis_json); !valid) return valid;
         const auto channel = channel_position(database, id, declaration.channel);
         if (!channel) return std::unexpected(channel.error());
@@ -411,7 +434,7 @@ Result<void> Store::record_declaration(TestId id, const DeclarationRecord& decla
 
 Result<void> Store::withdraw_declaration(TestId id, std::string_view channel, std::string_view reason) {
     auto& database = parts_->database();
-    return in_transaction(database, [&]() -> Result<void> {
+    return in_transaction(*parts_, [&]() -> Result<void> {
         const auto position = channel_position(database, id, std::string(channel));
         if (!position) return std::unexpected(position.error());
         return database.run(
@@ -422,7 +445,7 @@ Result<void> Store::withdraw_declaration(TestId id, std::string_view channel, st
 
 Result<void> Store::record_identifications(TestId id, std::span<const IdentificationRecord> identifications) {
     auto& database = parts_->database();
-    return in_transaction(database, [&]() -> Result<void> {
+    return in_transaction(*parts_, [&]() -> Result<void> {
         for (const auto& identification : identifications) {
             if (auto valid = check_json("identification", identification.verdict_json); !valid) return valid;
             const auto channel = channel_position(database, id, identification.channel);
@@ -441,11 +464,12 @@ Result<void> Store::record_identifications(TestId id, std::span<const Identifica
 
 Result<std::int64_t> Store::record_event(const EventRecord& event) {
     auto& database = parts_->database();
-    if (auto done = database.run(
+    const auto done = in_transaction(*parts_, [&] {
+        return database.run(
             "INSERT INTO events (test_id, wall_ns, time_s, kind, channel, message) VALUES (?, ?, ?, ?, ?, ?)",
             event.test_id, event.wall_ns, event.time_s, event.kind, event.channel, event.message);
-        !done)
-        return std::unexpected(done.error());
+    });
+    if (!done) return std::unexpected(done.error());
     return database.last_insert_id();
 }
 
@@ -453,18 +477,19 @@ Result<std::int64_t> Store::record_archive(const ArchiveRecord& archive) {
     auto& database = parts_->database();
     if (auto valid = check_json("archive", archive.spectrum_json); !valid)
         return std::unexpected(valid.error());
-    if (auto done = database.run(
+    const auto done = in_transaction(*parts_, [&] {
+        return database.run(
             "INSERT INTO archive (machine, test_id, created_wall_ns, spectrum) VALUES (?, ?, ?, ?)",
             archive.machine, archive.test_id, archive.created_wall_ns, archive.spectrum_json);
-        !done)
-        return std::unexpected(done.error());
+    });
+    if (!done) return std::unexpected(done.error());
     return database.last_insert_id();
 }
 
 Result<void> Store::set_state(TestId id, TestState state, Moment now, std::string_view reason) {
     auto& database = parts_->database();
     const bool ends = state == TestState::stopped || state == TestState::aborted;
-    auto done = in_transaction(database, [&]() -> Result<void> {
+    auto done = in_transaction(*parts_, [&]() -> Result<void> {
         const auto test = read().test(id);
         if (!test) return std::unexpected(test.error());
         if (!may_follow(test->state, state))

@@ -1,6 +1,7 @@
 #include "store/store_queue.hpp"
 
 #include <algorithm>
+#include <ranges>
 #include <utility>
 
 #include <fmt/format.h>
@@ -18,7 +19,7 @@ constexpr std::size_t most_refused = 1000;
 StoreQueue::StoreQueue(Store store, StoreQueueLimits limits) : store_(std::move(store)), limits_(limits) {}
 
 void StoreQueue::append_scan(TestId id, ScanRecord scan) {
-    Entry entry{.scan = std::move(scan), .test = id, .write = {}, .key = {}};
+    Entry entry{.scan = std::move(scan), .test = id, .write = {}, .key = {}, .state_before = {}};
     if (entry.holds_samples())
         add(std::move(entry));
     else
@@ -29,7 +30,14 @@ void StoreQueue::write(Write write, std::string_view key) {
     if (!key.empty()) {
         others_ -= std::erase_if(waiting_, [&](const Entry& entry) { return entry.key == key; });
     }
-    add({.scan = {}, .test = 0, .write = std::move(write), .key = std::string(key)});
+    add({.scan = {}, .test = 0, .write = std::move(write), .key = std::string(key), .state_before = {}});
+}
+
+void StoreQueue::set_state(TestId id, TestState from, TestState to, Moment now, std::string reason) {
+    Write change = [id, to, now, reason = std::move(reason)](Store& store) {
+        return store.set_state(id, to, now, reason);
+    };
+    add({.scan = {}, .test = id, .write = std::move(change), .key = {}, .state_before = from});
 }
 
 void StoreQueue::count(const Entry& entry, int by) {
@@ -131,16 +139,18 @@ void StoreQueue::retry_refused() {
 }
 
 bool StoreQueue::begin_anew(KnownTest known, Moment now) {
-    for (const Entry& entry : waiting_) {
-        if (entry.scan && entry.test == known.id)
-            known.before_scan = std::min(known.before_scan, entry.scan->scan);
+    // What waits is written behind it: an ended test would take none of it.
+    for (const Entry& entry : std::views::reverse(waiting_)) {
+        if (entry.test != known.id) continue;
+        if (entry.scan) known.before_scan = std::min(known.before_scan, entry.scan->scan);
+        if (entry.state_before) known.state = *entry.state_before;
     }
     const auto aside = store_.begin_anew(known, now);
+    damaged_ = !aside;
     if (!aside) {
         note_failure(aside.error());
         return false;
     }
-    damaged_ = false;
     news_.push_back(
         {StorageNews::Kind::set_aside,
          fmt::format("the database was damaged; it is kept as {}, and a new one goes on with what "

@@ -76,16 +76,13 @@ Result<void> check_rows(sqlite::Database& database, const RowCheck& check, Findi
 
 }  // namespace
 
-Result<bool> Reader::is_sound() const {
+Result<bool> Reader::is_sound(std::stop_token stop) const {
+    const sqlite::EndsWhenStopped ends(*database_, std::move(stop));
     auto check = database_->query("PRAGMA quick_check(1)");
     const bool sound = check.next() && check.text(0) == "ok";
     if (auto status = check.status(); !status && status.error().next != NextStep::stop)
         return std::unexpected(status.error());
     return sound;
-}
-
-void Reader::interrupt() const {
-    database_->interrupt();
 }
 
 Result<std::vector<Finding>> Reader::verify() const {

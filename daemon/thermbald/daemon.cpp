@@ -99,9 +99,7 @@ void Daemon::decide() {
     if (!test_.decision.stop) return;
 
     test_.state = TestState::declared;
-    write([id = test_.id, at = now(), reason = test_.decision.reason](Store& store) {
-        return store.set_state(id, TestState::declared, at, reason);
-    });
+    storage_.set_state(test_.id, TestState::running, TestState::declared, now(), test_.decision.reason);
     event("all_declared", test_.decision.reason);
     act_on_declaration();
 }
@@ -120,11 +118,9 @@ void Daemon::end_test(TestEvent how, const std::string& reason) {
     identifier_->cancel();
     comparer_->cancel();
     test_.identifying = test_.comparing = false;
+    storage_.set_state(test_.id, test_.state, *state, now(), reason);
     test_.state = *state;
     test_.end_reason = reason;
-    write([id = test_.id, ended = *state, at = now(), reason](Store& store) {
-        return store.set_state(id, ended, at, reason);
-    });
     archive_test();
     event(to_string(*state), reason);
     settle(test_.last_scan);

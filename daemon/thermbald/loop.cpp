@@ -88,8 +88,7 @@ Daemon::Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer se
         },
         [this](IdentificationResult result) { identifications_.push(std::move(result)); });
     comparer_ = std::make_unique<Comparer>(
-        [](const ComparisonJob& job, const std::function<bool()>&) { return compare(job); },
-        [this](ComparisonResult result) { comparisons_.push(std::move(result)); });
+        compare, [this](ComparisonResult result) { comparisons_.push(std::move(result)); });
     for (std::size_t i = 0; i < lines_.size(); ++i) {
         readers_.push_back(std::make_unique<LineReader>(i, *lines_[i], clock_, line_readings_));
     }

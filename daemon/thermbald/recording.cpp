@@ -62,7 +62,8 @@ void Daemon::write(StoreQueue::Write write, std::string_view key) {
 }
 
 /// At once, not at the next start: a test runs for hours, and what a damaged file does not take has only the
-/// memory to wait in. Not again and again on a disk that spoils every file.
+/// memory to wait in. Not again and again on a disk that spoils every file: what fails or comes too early is
+/// tried again at a later scan.
 void Daemon::leave_damaged_database() {
     constexpr std::int64_t pause_ns = 600'000'000'000;
     if (left_database_ns_ && real_monotonic_ns() - *left_database_ns_ < pause_ns) return;
@@ -76,6 +77,7 @@ void Daemon::leave_damaged_database() {
             .reason = test_.end_reason,
             .before_scan = test_.last_scan + 1};
         known.record.started = {test_.started_wall_ns, test_.grid.start_ns};
+        known.record.period_s = test_.window.period_s;
     } else if (const auto open = storage_.store().read().open_test(); open && *open) {
         known = {.id = (*open)->id,
                  .record = (*open)->record,
@@ -83,7 +85,8 @@ void Daemon::leave_damaged_database() {
                  .reason = (*open)->stop_reason,
                  .before_scan = (*open)->last_scan.value_or(-1) + 1};
     }
-    storage_.begin_anew(std::move(known), now());
+    // A check that still runs reads the file that is set aside now.
+    if (storage_.begin_anew(std::move(known), now())) file_check_.reset();
 }
 
 /// A large file was not read through before the first scan; it is, beside the scans.
@@ -94,11 +97,13 @@ void Daemon::check_database() {
 }
 
 void Daemon::take_file_check(const Result<bool>& sound) {
+    if (!file_check_) return;
     file_check_.reset();
     if (!sound) {
         event("database_unchecked",
               fmt::format("the database could not be looked through for damage: {}", sound.error().message));
     } else if (!*sound) {
+        storage_.note_damage();
         leave_damaged_database();
         tell_storage_news();
     }

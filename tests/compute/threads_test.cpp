@@ -4,10 +4,12 @@
 #include <chrono>
 #include <mutex>
 #include <set>
+#include <system_error>
 #include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <pthread.h>
 
 namespace thermbal {
 namespace {
@@ -38,6 +40,47 @@ TEST(Threads, ABodyMayCallAgainAndNoMoreRunAtOnceThanAskedFor) {
     EXPECT_EQ(done, 100);
     EXPECT_LE(most, threads);
     EXPECT_GT(most, 1);
+}
+
+/// While it lives the system makes no thread: a stack of the whole address space is asked for.
+class NoThreadLeft {
+  public:
+    NoThreadLeft() {
+        pthread_getattr_default_np(&before_);
+        pthread_attr_t attributes;
+        pthread_getattr_default_np(&attributes);
+        pthread_attr_setstacksize(&attributes, std::size_t{1} << 47U);
+        pthread_setattr_default_np(&attributes);
+        pthread_attr_destroy(&attributes);
+    }
+    NoThreadLeft(const NoThreadLeft&) = delete;
+    NoThreadLeft& operator=(const NoThreadLeft&) = delete;
+    ~NoThreadLeft() {
+        pthread_setattr_default_np(&before_);
+        pthread_attr_destroy(&before_);
+    }
+
+  private:
+    pthread_attr_t before_;
+};
+
+TEST(Threads, WhereNoThreadCanBeMadeThoseThereAreDoTheWork) {
+    const ParallelFor parallel_for = parallel_on_threads(3, false);
+    {
+        const NoThreadLeft none;
+        ASSERT_THROW(std::thread([] {}), std::system_error);
+        int done = 0;
+        parallel_for(100, [&](std::size_t) { ++done; });
+        EXPECT_EQ(done, 100);
+    }
+    // Both bodies wait for each other, which one thread alone cannot.
+    std::atomic<int> there = 0;
+    const auto give_up = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    parallel_for(2, [&](std::size_t) {
+        ++there;
+        while (there < 2 && std::chrono::steady_clock::now() < give_up) std::this_thread::yield();
+        EXPECT_EQ(there, 2);
+    });
 }
 
 TEST(Threads, WhoIsDoneHelpsABodyThatStillRuns) {

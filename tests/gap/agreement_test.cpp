@@ -88,6 +88,16 @@ TEST(Agreement, AShortTestSaysNothing) {
     EXPECT_THAT(*found, IsEmpty());
 }
 
+TEST(Agreement, ACancelledCheckEndsWithTheSimulationUnderWay) {
+    int looks = 0;
+    const auto found = check_agreement(small_machine(), measured_on(small_machine(), 60.0, 0.05, 1), {}, {},
+                                       [&looks] { return ++looks >= 3; });
+    ASSERT_FALSE(found);
+    EXPECT_EQ(found.error().next, NextStep::stop);
+    // The first sensitivities, all of them but two given up.
+    EXPECT_LT(looks, 40);
+}
+
 TEST(Agreement, ATestWithoutAnySensorOfTheModelIsRefused) {
     RecordedTest test = measured_on(small_machine(), 60.0, 0.05, 1);
     for (Column& channel : test.channels) channel.name += "9";

@@ -2,6 +2,7 @@
 import json
 import os
 import pathlib
+import sqlite3
 import subprocess
 import tempfile
 import time
@@ -76,6 +77,33 @@ def nothing_is_lost_when_both_die():
         subscriber.stop()
         assert publisher.stop() == 0, publisher.log()
         assert of_topic(subscriber.messages(), "thermbal/VMC 850/status")
+
+
+def cpu_s(process):
+    fields = pathlib.Path(f"/proc/{process.pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def a_database_that_cannot_be_read_is_waited_for():
+    """Another program altered a table: said once, asked a few times a second, and sent when it is as it was."""
+    with scratch() as folder, Broker(folder) as broker:
+        subscriber = Subscriber(folder, broker.port)
+        assert write_databases(folder, 1, 40, 1).wait(30) == 0
+        other = sqlite3.connect(f"{folder}/0.db", isolation_level=None)
+        other.execute("ALTER TABLE samples RENAME TO mine")
+        publisher = Publisher(folder, configuration(folder, broker.port))
+        wait_until(lambda: "no such table" in publisher.log(), "it says why", 30)
+        before_s = cpu_s(publisher.process)
+        time.sleep(1.0)
+        spent_s = cpu_s(publisher.process) - before_s
+        assert spent_s < 0.2, f"{spent_s} s of processor time in 1 s of waiting"
+        assert publisher.log().count("no such table") == 1, publisher.log()
+        other.execute("ALTER TABLE mine RENAME TO samples")
+        other.close()
+        stored = stored_samples(f"{folder}/0.db")
+        wait_until(lambda: received_samples(subscriber.messages()) == stored, "every scan", 30)
+        subscriber.stop()
+        assert publisher.stop() == 0, publisher.log()
 
 
 def a_dead_publisher_is_told():
@@ -161,8 +189,8 @@ def wrong_usage_is_said():
 
 def main():
     skip_without_mosquitto()
-    for test in (everything_arrives, nothing_is_lost_when_both_die, a_dead_publisher_is_told,
-                 a_hostile_name_is_one_level, tls_certificate_and_password, wrong_usage_is_said):
+    for test in (everything_arrives, nothing_is_lost_when_both_die, a_database_that_cannot_be_read_is_waited_for,
+                 a_dead_publisher_is_told, a_hostile_name_is_one_level, tls_certificate_and_password, wrong_usage_is_said):
         started = time.monotonic()
         test()
         print(f"ok   {test.__name__} ({time.monotonic() - started:.1f} s)", flush=True)

@@ -3,6 +3,7 @@
 #include <fstream>
 #include <future>
 #include <memory>
+#include <stop_token>
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -15,6 +16,7 @@
 #include "store/file_check.hpp"
 #include "store/store.hpp"
 #include "support.hpp"
+#include "watched_vfs.hpp"
 
 namespace thermbal::test {
 namespace {
@@ -219,6 +221,21 @@ TEST_F(OpeningTest, ALargeDatabaseIsOpenedFirstAndCheckedBesideTheScans) {
     EXPECT_FALSE(*spoilt);
 }
 
+TEST_F(OpeningTest, ACheckThatIsStoppedBeforeItBeginsEndsAtOnce) {
+    {
+        auto store = open_store(path);
+        ASSERT_OK(store.begin_test(test_record()));
+    }
+    const auto reader = Reader::open(path);
+    ASSERT_OK(reader);
+    std::stop_source stop;
+    stop.request_stop();
+    const auto stopped = reader->is_sound(stop.get_token());
+    ASSERT_FALSE(stopped);
+    EXPECT_EQ(stopped.error().next, NextStep::retry);
+    EXPECT_EQ(*reader->is_sound(), true) << "the next one is not";
+}
+
 TEST_F(OpeningTest, ATestGoesOnInANewDatabaseWithWhatCanBeRead) {
     constexpr std::int64_t scans = 1500;
     TestId id = 0;
@@ -311,6 +328,52 @@ TEST_F(OpeningTest, ANewDatabaseHoldsWhatWasDeclaredAndWhatWasWithdrawn) {
     EXPECT_EQ((*resumed)->identifications[0].verdict_json, "{\"n\":8}");
 }
 
+TEST_F(OpeningTest, WhatIsReadAndCannotBeCountsAsNotReadable) {
+    auto store = open_store(path);
+    const auto id = *store.begin_test(test_record());
+    ASSERT_OK(store.append_scans(id, scan_records(30)));
+    ASSERT_OK(store.record_declaration(id, declaration_of("T5", 10, 24.5)));
+    ASSERT_OK(store.record_declaration(id, declaration_of("T6", 20, 25.5)));
+    for (const char* channel : {"T5", "T6"}) {
+        const IdentificationRecord said{.channel = channel, .window_end_scan = 29};
+        ASSERT_OK(store.record_identifications(id, std::span(&said, 1)));
+    }
+    for (const char* machine : {"VMC 850", "VMC 1000"})
+        ASSERT_OK(store.record_archive({.machine = machine, .test_id = id}));
+    EventRecord door;
+    door.test_id = id;
+    door.kind = "annotation";
+    ASSERT_OK(store.record_event(door));
+    {
+        Direct direct(path);
+        ASSERT_EQ(direct.run("PRAGMA ignore_check_constraints = ON;"
+                             "UPDATE scans SET time_s = 1e9 WHERE scan = 5;"
+                             "UPDATE samples SET value_C = NULL WHERE scan = 7 AND channel = 3;"
+                             "UPDATE declarations SET basis = 'Z' WHERE window_end_scan = 10;"
+                             "UPDATE identifications SET verdict = 'Z' WHERE channel = 4;"
+                             "UPDATE archive SET spectrum = 'Z' WHERE machine = 'VMC 1000';"
+                             "UPDATE events SET kind = '' WHERE id = 1;"),
+                  SQLITE_OK)
+            << direct.message();
+    }
+    ASSERT_OK(store.begin_anew({.id = id, .record = test_record(), .reason = {}, .before_scan = 30}, start));
+    const auto scans = store.read().scans(id);
+    ASSERT_OK(scans);
+    ASSERT_EQ(scans->size(), 30U);
+    for (const ScanRecord& scan : *scans) {
+        const bool missed = scan.scan == 5 || scan.scan == 7;
+        EXPECT_EQ(scan.status, missed ? ScanStatus::missed : ScanStatus::ok) << scan.scan;
+    }
+    const auto resumed = store.resume();
+    ASSERT_OK(resumed);
+    ASSERT_EQ((*resumed)->declarations.size(), 1U);
+    EXPECT_EQ((*resumed)->declarations[0].channel, "T6");
+    ASSERT_EQ((*resumed)->identifications.size(), 1U);
+    EXPECT_EQ((*resumed)->identifications[0].channel, "T6");
+    EXPECT_EQ(store.read().archive("")->size(), 1U);
+    EXPECT_THAT(findings_text(*store.read().verify()), IsEmpty());
+}
+
 /// What the end of the process between the renames of begin_anew leaves: the new one is whole and not in
 /// place yet.
 class NewDatabaseTest : public OpeningTest {
@@ -378,6 +441,91 @@ TEST_F(OpeningTest, WhereNoNewDatabaseCanBeMadeTheOldOneStays) {
     std::ofstream(path.string() + ".new/in_the_way") << "x";
     ASSERT_FALSE(
         store.begin_anew({.id = id, .record = test_record(), .reason = {}, .before_scan = 1}, start));
+    ASSERT_OK(store.append_scan(id, scan_record(1)));
+    EXPECT_EQ(store.read().scans(id)->size(), 2U);
+}
+
+class UnfinishedMoveTest : public OpeningTest {
+  protected:
+    KnownTest known{.id = 1, .record = test_record(), .reason = {}, .before_scan = 1};
+
+    /// The old one is renamed, and the new one cannot be opened in its place.
+    Store store_with_unfinished_move() {
+        install_watched_vfs();
+        auto store = open_store(path);
+        EXPECT_EQ(store.begin_test(test_record()), 1);
+        EXPECT_TRUE(store.append_scan(1, scan_record(0)));
+        refuse_to_open(path.filename());
+        EXPECT_FALSE(store.begin_anew(known, start));
+        return store;
+    }
+    ~UnfinishedMoveTest() override { refuse_to_open(""); }
+
+    void expect_scans(std::size_t count) const {
+        const auto store = open_store(path);
+        const auto resumed = store.resume();
+        ASSERT_OK(resumed);
+        ASSERT_TRUE(*resumed);
+        EXPECT_EQ(store.read().scans(1)->size(), count);
+        EXPECT_THAT(findings_text(*store.read().verify()), IsEmpty());
+    }
+};
+
+TEST_F(UnfinishedMoveTest, NothingIsWrittenBeforeItIsFinished) {
+    {
+        auto store = store_with_unfinished_move();
+        const auto refused = store.append_scan(1, scan_record(1));
+        ASSERT_FALSE(refused);
+        EXPECT_EQ(refused.error().next, NextStep::retry);
+        EXPECT_THAT(refused.error().message, HasSubstr("set aside"));
+        EXPECT_FALSE(store.record_event({}));
+        EXPECT_FALSE(store.begin_anew(known, start));
+        refuse_to_open("");
+        const auto aside = store.begin_anew(known, start);
+        ASSERT_OK(aside);
+        EXPECT_TRUE(std::filesystem::exists(*aside));
+        ASSERT_OK(store.append_scan(1, scan_record(1)));
+    }
+    expect_scans(2);
+}
+
+TEST_F(UnfinishedMoveTest, IsFinishedByTheNextStart) {
+    {
+        const auto store = store_with_unfinished_move();
+    }
+    refuse_to_open("");
+    expect_scans(1);
+}
+
+TEST_F(OpeningTest, ADatabaseThatCannotBeRenamedKeepsItsLog) {
+    const std::filesystem::path in_the_way = path.string() + ".damaged-20231114T221320Z-shm";
+    std::filesystem::create_directory(in_the_way);
+    {
+        auto store = open_store(path);
+        ASSERT_OK(store.begin_test(test_record()));
+        ASSERT_OK(store.append_scan(1, scan_record(0)));
+        ASSERT_FALSE(
+            store.begin_anew({.id = 1, .record = test_record(), .reason = {}, .before_scan = 1}, start));
+        ASSERT_OK(store.append_scan(1, scan_record(1)));
+    }
+    std::filesystem::remove(in_the_way);
+    const auto store = open_store(path);
+    EXPECT_FALSE(store.set_aside());
+    ASSERT_TRUE(*store.resume());
+    EXPECT_EQ(store.read().scans(1)->size(), 2U);
+}
+
+TEST_F(OpeningTest, WhatTheFileSystemDoesNotAnswerIsAnErrorAndTheOldOneStays) {
+    // With what is appended to it, the name is too long to be looked for.
+    path = folder / std::string(240, 'd').c_str();
+    auto store = open_store(path);
+    const auto id = *store.begin_test(test_record());
+    ASSERT_OK(store.append_scan(id, scan_record(0)));
+    const auto aside =
+        store.begin_anew({.id = id, .record = test_record(), .reason = {}, .before_scan = 1}, start);
+    ASSERT_FALSE(aside);
+    EXPECT_EQ(aside.error().next, NextStep::retry);
+    EXPECT_THAT(aside.error().message, HasSubstr("cannot be looked at"));
     ASSERT_OK(store.append_scan(id, scan_record(1)));
     EXPECT_EQ(store.read().scans(id)->size(), 2U);
 }

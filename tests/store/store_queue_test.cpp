@@ -116,6 +116,23 @@ TEST_F(StoreQueueTest, MissedScansWaitForWhatComesNext) {
     EXPECT_EQ(stored(), 301U);
 }
 
+TEST_F(StoreQueueTest, ATableThatAnotherProgramAlteredIsNoDamage) {
+    append(0);
+    Direct other(folder / "thermbal.db");
+    ASSERT_EQ(other.run("ALTER TABLE samples RENAME TO mine"), SQLITE_OK) << other.message();
+    append(1);
+    append(2);
+    EXPECT_FALSE(queue.damaged());
+    EXPECT_THAT(news(), ::testing::ElementsAre(StorageNews::Kind::away));
+    EXPECT_THAT(queue.problem(), HasSubstr("another program"));
+    EXPECT_EQ(queue.unstored_scans(), 2U);
+    ASSERT_EQ(other.run("ALTER TABLE mine RENAME TO samples"), SQLITE_OK) << other.message();
+    append(3);
+    EXPECT_EQ(queue.unstored_scans(), 0U);
+    EXPECT_EQ(stored(), 4U);
+    EXPECT_THAT(findings_text(*queue.store().read().verify()), IsEmpty());
+}
+
 TEST_F(StoreQueueTest, ARefusedScanHoldsUpNothingAndIsTriedAgain) {
     append(0);
     Direct other(folder / "thermbal.db");
@@ -139,11 +156,15 @@ TEST_F(StoreQueueTest, WhatWaitsIsWrittenBehindWhatCouldBeReadOfADamagedDatabase
     set_write_fault(WriteFault::io_error);
     for (std::int64_t scan = 4; scan <= 6; ++scan) append(scan);
     const KnownTest known{.id = id, .record = test_record(), .reason = {}, .before_scan = 7};
+    queue.note_damage();
+    EXPECT_TRUE(queue.damaged());
     EXPECT_FALSE(queue.begin_anew(known, start)) << "the disk takes no other file either";
+    EXPECT_TRUE(queue.damaged()) << "to be tried again";
     EXPECT_EQ(queue.unstored_scans(), 3U);
 
     set_write_fault(WriteFault::none);
     EXPECT_TRUE(queue.begin_anew(known, start));
+    EXPECT_FALSE(queue.damaged());
     EXPECT_THAT(news(), ::testing::ElementsAre(StorageNews::Kind::away, StorageNews::Kind::set_aside,
                                                StorageNews::Kind::back));
     const auto scans = queue.store().read().scans(id);
@@ -154,6 +175,60 @@ TEST_F(StoreQueueTest, WhatWaitsIsWrittenBehindWhatCouldBeReadOfADamagedDatabase
         EXPECT_EQ(scan.samples[4].value_C, value_C(scan.scan, 4));
     }
     EXPECT_EQ(queue.unstored_scans(), 0U);
+}
+
+TEST_F(StoreQueueTest, WhatWaitsOfATestThatEndedMeanwhileIsStored) {
+    for (std::int64_t scan = 0; scan <= 3; ++scan) append(scan);
+    set_write_fault(WriteFault::io_error);
+    append(4);
+    queue.set_state(id, TestState::running, TestState::declared, start, "all settled");
+    append(5);
+    queue.set_state(id, TestState::declared, TestState::stopped, start, "all settled");
+    set_write_fault(WriteFault::none);
+    ASSERT_TRUE(queue.begin_anew({.id = id,
+                                  .record = test_record(),
+                                  .state = TestState::stopped,
+                                  .reason = "all settled",
+                                  .before_scan = 6},
+                                 start));
+    EXPECT_EQ(queue.refused_writes(), 0U);
+    EXPECT_EQ(queue.unstored_writes(), 0U);
+    EXPECT_THAT(news(), ::testing::ElementsAre(StorageNews::Kind::away, StorageNews::Kind::set_aside,
+                                               StorageNews::Kind::back));
+    const auto test = queue.store().read().test(id);
+    ASSERT_OK(test);
+    EXPECT_EQ(test->state, TestState::stopped);
+    EXPECT_EQ(test->stop_reason, "all settled");
+    EXPECT_EQ(stored(), 6U);
+    EXPECT_THAT(findings_text(*queue.store().read().verify()), IsEmpty());
+}
+
+TEST_F(StoreQueueTest, ATestWhoseDeclarationWaitsIsNotRefusedIt) {
+    append(0);
+    set_write_fault(WriteFault::io_error);
+    append(1);
+    queue.set_state(id, TestState::running, TestState::declared, start, "all settled");
+    set_write_fault(WriteFault::none);
+    ASSERT_TRUE(queue.begin_anew({.id = id,
+                                  .record = test_record(),
+                                  .state = TestState::declared,
+                                  .reason = "all settled",
+                                  .before_scan = 2},
+                                 start));
+    EXPECT_EQ(queue.refused_writes(), 0U);
+    EXPECT_EQ(queue.store().read().test(id)->state, TestState::declared);
+    EXPECT_EQ(stored(), 2U);
+}
+
+TEST_F(StoreQueueTest, ADamageWhoseNewDatabaseCannotBeMadeIsTriedAgain) {
+    append(0);
+    set_write_fault(WriteFault::full);
+    EXPECT_FALSE(
+        queue.begin_anew({.id = id, .record = test_record(), .reason = {}, .before_scan = 1}, start));
+    set_write_fault(WriteFault::none);
+    append(1);
+    EXPECT_EQ(stored(), 2U) << "the old one still takes scans";
+    EXPECT_TRUE(queue.damaged());
 }
 
 TEST_F(StoreQueueTest, OfWhatHasAKeyOnlyTheNewestWaits) {

@@ -117,6 +117,26 @@ TEST_F(StoreTest, CsvIsTheRecordedTest) {
     EXPECT_EQ(recorded->inputs[0].name, "spindle_rpm");
 }
 
+TEST_F(StoreTest, ValuesOfAScanThatIsNotThereAreAnError) {
+    auto store = open_store(path);
+    const auto id = store.begin_test(test_record(2));
+    for (std::int64_t k = 0; k < 4; ++k) ASSERT_OK(store.append_scan(*id, scan_record(k, 2)));
+    Direct direct(path);
+    // Of the last scan, and of one between: neither has a place.
+    for (const char* gone : {"DELETE FROM scans WHERE scan = 3", "DELETE FROM scans WHERE scan = 1"}) {
+        ASSERT_EQ(direct.run(gone), SQLITE_OK) << direct.message();
+        const auto recorded = store.read().recorded_test(*id);
+        ASSERT_FALSE(recorded);
+        EXPECT_EQ(recorded.error().next, NextStep::stop);
+        EXPECT_THAT(recorded.error().message, HasSubstr("run verify"));
+        ASSERT_EQ(direct.run("DELETE FROM samples WHERE scan = 3; DELETE FROM inputs WHERE scan = 3"),
+                  SQLITE_OK);
+    }
+    ASSERT_EQ(direct.run("UPDATE samples SET scan = -1 WHERE scan = 0"), SQLITE_OK) << direct.message();
+    EXPECT_FALSE(store.read().window(*id));
+    EXPECT_FALSE(store.read().window(*id, -5));
+}
+
 TEST_F(StoreTest, WhatATestWasBegunWithAndWhatTheModuleSaidStandBesideItsValues) {
     auto store = open_store(path);
     TestRecord record = test_record(2);

@@ -17,6 +17,7 @@ constexpr std::size_t sector = 512;
 struct State {
     std::mutex mutex;
     WriteFault fault = WriteFault::none;
+    std::string not_to_be_opened;
     bool recording = false;
     std::vector<FileOperation> record;
     sqlite3_vfs* real = nullptr;
@@ -39,6 +40,11 @@ void note(FileOperation operation) {
 WriteFault fault() {
     const std::lock_guard lock(state().mutex);
     return state().fault;
+}
+
+std::string not_to_be_opened() {
+    const std::lock_guard lock(state().mutex);
+    return state().not_to_be_opened;
 }
 
 /// What SQLite allocates for an open file: this, and behind it the real one.
@@ -146,6 +152,7 @@ const sqlite3_io_methods& methods() {
 int open_file(sqlite3_vfs*, const char* path, sqlite3_file* file, int flags, int* out_flags) {
     WatchedFile& opened = watched(file);
     opened.base.pMethods = nullptr;
+    if (path != nullptr && name_of(path) == not_to_be_opened()) return SQLITE_CANTOPEN;
     const int code = state().real->xOpen(state().real, path, opened.real(), flags, out_flags);
     if (opened.real()->pMethods == nullptr) return code;
     opened.name = new std::string(name_of(path));
@@ -204,6 +211,11 @@ void install_watched_vfs() {
 void set_write_fault(WriteFault wanted) {
     const std::lock_guard lock(state().mutex);
     state().fault = wanted;
+}
+
+void refuse_to_open(std::string name) {
+    const std::lock_guard lock(state().mutex);
+    state().not_to_be_opened = std::move(name);
 }
 
 void start_record() {

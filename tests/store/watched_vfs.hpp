@@ -23,6 +23,8 @@ struct FileOperation {
 enum class WriteFault : std::uint8_t { none, full, io_error, sync_error, read_only };
 void install_watched_vfs();
 void set_write_fault(WriteFault fault);
+/// The file of this name (without folder) cannot be opened from now on; empty: every one can.
+void refuse_to_open(std::string name);
 void start_record();
 std::vector<FileOperation> take_record();
 /// Puts into the record that `scan` is acknowledged now.

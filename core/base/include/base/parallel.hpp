@@ -10,6 +10,13 @@ namespace thermbal {
 /// not throw.
 using ParallelFor = std::function<void(std::size_t count, const std::function<void(std::size_t)>& body)>;
 
+/// Asked between the parts of a long computation; true makes it return an Error soon. Must be safe to call
+/// from ParallelFor's threads.
+using Cancelled = std::function<bool()>;
+inline bool never_cancelled() {
+    return false;
+}
+
 /// Runs the bodies one after the other on the calling thread.
 inline void sequential_for(std::size_t count, const std::function<void(std::size_t)>& body) {
     for (std::size_t i = 0; i < count; ++i) body(i);

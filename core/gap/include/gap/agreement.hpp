@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/error.hpp"
+#include "base/parallel.hpp"
 #include "gap/calibrate.hpp"
 #include "network/model.hpp"
 #include "series/recorded_test.hpp"
@@ -36,9 +37,10 @@ struct ChannelAgreement {
 /// Whether a test so far can be what the model says: its uncertain numbers are fitted to the test within what
 /// the model states of them (calibrate); what noise and the model's fidelity do not allow of the rest is a
 /// disagreement, whenever in the test it was. `disagreeing`: the channels that disagreed before. Pure; empty
-/// while the test is too short. Errors: those of calibrate. Any thread.
+/// while the test is too short. Errors: those of calibrate; stop when cancelled. Any thread.
 Result<std::vector<ChannelAgreement>> check_agreement(const Model& model, const RecordedTest& test,
                                                       std::span<const std::string> disagreeing,
-                                                      const AgreementOptions& options = {});
+                                                      const AgreementOptions& options = {},
+                                                      const Cancelled& cancelled = never_cancelled);
 
 }  // namespace thermbal

@@ -58,12 +58,6 @@ struct SweepResult {
     std::vector<LagFit> by_lag;  ///< first_lag ... last_lag
 };
 
-/// Asked between fits; true makes the call return an Error soon. Must be safe to call from ParallelFor's
-/// threads.
-using Cancelled = std::function<bool()>;
-inline bool never_cancelled() {
-    return false;
-}
 inline std::unexpected<Error> sweep_cancelled() {
     return fail(NextStep::stop, "the sweep was cancelled");
 }

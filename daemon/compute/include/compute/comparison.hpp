@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/error.hpp"
+#include "base/parallel.hpp"
 #include "compute/newest_first.hpp"
 #include "gap/agreement.hpp"
 #include "network/model.hpp"
@@ -42,8 +43,9 @@ struct ComparisonResult {
 };
 
 /// The model as it stands, driven by the test's inputs and started at its first readings, at the newest scan;
-/// with `check` what check_agreement says of the whole test. Pure. Any thread.
-ComparisonResult compare(const ComparisonJob& job);
+/// with `check` what check_agreement says of the whole test, which ends soon once `cancelled` says so. Pure.
+/// Any thread.
+ComparisonResult compare(const ComparisonJob& job, const Cancelled& cancelled = never_cancelled);
 
 using Comparer = NewestFirst<ComparisonJob, ComparisonResult>;
 

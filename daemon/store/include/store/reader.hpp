@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,8 +23,9 @@ class Database;
 /// Everything that can be asked of a database. Never writes. One thread at a time; several Readers may be
 /// open while the daemon writes, each sees what was committed when its call began.
 ///
-/// Errors: `retry` when the database is locked or the disk fails at the moment, `stop` when it is damaged,
-/// `refuse_input` when what was asked for is not there or the file is not ours or newer than this program.
+/// Errors: `retry` when the database is locked, altered, or the disk fails at the moment, `stop` when it is
+/// damaged, `refuse_input` when what was asked for is not there or the file is not ours or newer than this
+/// program.
 class Reader {
   public:
     /// Opens an existing database read only (`mode=ro`).
@@ -74,10 +76,9 @@ class Reader {
     /// test's grid, one sample a channel a scan, a value exactly where the quality is good, times that rise.
     Result<std::vector<Finding>> verify() const;
 
-    /// Whether all pages of the file hang together. Reads all of it: seconds for a large one.
-    Result<bool> is_sound() const;
-    /// Ends an is_sound() under way with an error. Any thread.
-    void interrupt() const;
+    /// Whether all pages of the file hang together. Reads all of it: seconds for a large one. Ends with an
+    /// error (`retry`) once `stop` is requested, before it began or after.
+    Result<bool> is_sound(std::stop_token stop = {}) const;
 
     /// A consistent copy into a new file, while the daemon goes on writing. Refuses to overwrite.
     Result<void> backup(const std::filesystem::path& copy) const;

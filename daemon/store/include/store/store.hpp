@@ -31,7 +31,8 @@ struct StoreOptions {
     std::uintmax_t checked_at_once_bytes = 4'194'304;
 };
 
-/// What the daemon knows of its latest test without asking the database. id 0: there is none.
+/// What the daemon knows of its latest test without asking the database, as it was given to the database.
+/// id 0: there is none.
 struct KnownTest {
     TestId id = 0;
     TestRecord record;
@@ -44,8 +45,8 @@ struct KnownTest {
 /// transaction and returns after it is on the disk. One thread at a time.
 ///
 /// Errors: `retry` when nothing was written and the same call may succeed later (locked, full, I/O error,
-/// read only); `refuse_input` when what was given contradicts what is stored; `stop` when the database is
-/// damaged. After any error nothing of the call is in the database.
+/// read only, a table that another program altered); `refuse_input` when what was given contradicts what is
+/// stored; `stop` when the database is damaged. After any error nothing of the call is in the database.
 class Store {
   public:
     /// Opens or creates the database, brings an older one to this version, and holds it: a second Store on
@@ -62,7 +63,8 @@ class Store {
     /// The database turned out to be damaged: it is renamed, and a new one takes its place with the test, of
     /// its scans those that can still be read (the others are missed ones), and what the archive says of the
     /// machines. The test keeps its id. Takes as long as writing the test again. Returns the new name of the
-    /// damaged file. After an error all is as it was before.
+    /// damaged file. After an error all is as it was before; or the damaged file has its new name already:
+    /// then nothing is written (`retry`) until a later call has put the new one in place.
     Result<std::filesystem::path> begin_anew(const KnownTest& known, Moment now);
 
     /// All queries, on this connection.
@@ -114,6 +116,8 @@ class Store {
   private:
     struct Parts;
     explicit Store(std::unique_ptr<Parts> parts);
+    /// The database that is to follow this one, whole and beside it.
+    Result<void> make_successor(const KnownTest& known, Moment now);
     std::unique_ptr<Parts> parts_;
 };
 

@@ -28,8 +28,8 @@ struct StorageNews {
 };
 
 /// Writes to a Store in order, and keeps in memory what it does not take at the moment: a full disk, an I/O
-/// error, a read-only remount, a lock of another program. Nothing overtakes what waits. One thread; no call
-/// waits for longer than the store's busy timeout.
+/// error, a read-only remount, another program that locks or alters it. Nothing overtakes what waits. One
+/// thread; no call waits for longer than the store's busy timeout.
 class StoreQueue {
   public:
     using Write = std::function<Result<void>(Store&)>;
@@ -41,12 +41,18 @@ class StoreQueue {
     /// A write of any kind. With a key, it takes the place of one that waits with the same key: of what is
     /// only of interest in its newest state, an outage keeps only that.
     void write(Write write, std::string_view key = {});
+    /// Store::set_state, of a test that is `from` with all that was given before.
+    void set_state(TestId id, TestState from, TestState to, Moment now, std::string reason);
 
     /// The database turned out to be damaged: goes on in a new one with what can still be read of the test
-    /// (Store::begin_anew) and what waits here. True when that was done; else it is to be tried again later.
+    /// (Store::begin_anew), as it was before the oldest write that waits here, and with what waits. `known`
+    /// is the test with all that was given. True when that was done; else it is to be tried again later.
     bool begin_anew(KnownTest known, Moment now);
-    /// The database said of itself that it is damaged.
+    /// The database said of itself that it is damaged, or note_damage did: begin_anew is due until it
+    /// succeeds.
     bool damaged() const { return damaged_; }
+    /// A look through the file found what no write has met yet.
+    void note_damage() { damaged_ = true; }
 
     /// Tries to write what waits. After a failure the rest waits for the next call: call it once a scan.
     void flush();
@@ -73,6 +79,7 @@ class StoreQueue {
         TestId test = 0;
         Write write;
         std::string key;
+        std::optional<TestState> state_before;  ///< of a write that changes the test's state
 
         bool holds_samples() const { return scan && scan->status != ScanStatus::missed; }
     };
