@@ -178,6 +178,12 @@ Result<std::shared_ptr<Database>> Database::open(const std::filesystem::path& pa
                       SQLITE_OPEN_URI | SQLITE_OPEN_FULLMUTEX | SQLITE_OPEN_EXRESCODE;
     const int code = sqlite3_open_v2(uri_of(path, mode).c_str(), &handle, flags, nullptr);
     std::shared_ptr<Database> database(new Database(handle, path));
+    if (code == SQLITE_CANTOPEN && mode != OpenMode::read_write) {
+        return fail(next_step(code),
+                    fmt::format("database {}: cannot be opened to read: check that it is there "
+                                "and that you may read it",
+                                path.string()));
+    }
     if (code != SQLITE_OK) return std::unexpected(error_of(handle, code));
     sqlite3_busy_timeout(handle, busy_timeout_ms);
     // mmap: a bad sector would be a SIGBUS instead of an error.
