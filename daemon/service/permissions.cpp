@@ -1,8 +1,7 @@
 #include "permissions.hpp"
 
 #include <algorithm>
-#include <array>
-#include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 #include <grp.h>
@@ -28,36 +27,13 @@ std::optional<gid_t> group_id(const std::string& name) {
     return found->gr_gid;
 }
 
-struct User {
-    std::string name;
-    gid_t group = 0;
-};
-
-std::optional<User> user(uid_t uid) {
+std::string user_name(uid_t uid) {
     EntryBuffer buffer(entry_bytes);
     passwd entry{};
     passwd* found = nullptr;
     if (getpwuid_r(uid, &entry, buffer.data(), buffer.size(), &found) != 0 || found == nullptr)
-        return std::nullopt;
-    return User{found->pw_name, found->pw_gid};
-}
-
-bool listed_in_database(uid_t uid, gid_t wanted) {
-    const auto entry = user(uid);
-    if (!entry) return false;
-    std::vector<gid_t> groups(64);
-    auto count = static_cast<int>(groups.size());
-    if (getgrouplist(entry->name.c_str(), entry->group, groups.data(), &count) < 0) {
-        groups.resize(static_cast<std::size_t>(count));
-        if (getgrouplist(entry->name.c_str(), entry->group, groups.data(), &count) < 0) return false;
-    }
-    groups.resize(static_cast<std::size_t>(count));
-    return std::find(groups.begin(), groups.end(), wanted) != groups.end();
-}
-
-std::string name_of(uid_t uid) {
-    const auto entry = user(uid);
-    return entry ? entry->name : fmt::format("uid {}", uid);
+        return fmt::format("uid {}", uid);
+    return found->pw_name;
 }
 
 }  // namespace
@@ -73,20 +49,24 @@ std::vector<gid_t> peer_groups(int connected_socket) {
     return {};
 }
 
-bool may_change(const Peer& peer, const std::vector<gid_t>& groups, const std::string& operators_group) {
+Operators::Operators(std::string group)
+    : group_(std::move(group)), group_id_(group_id(group_)), own_user_(user_name(geteuid())) {}
+
+bool Operators::may_change(const Peer& peer, const std::vector<gid_t>& groups) const {
     if (peer.uid == 0 || peer.uid == geteuid()) return true;
-    const auto wanted = group_id(operators_group);
-    if (!wanted) return false;
-    return peer.gid == *wanted || std::find(groups.begin(), groups.end(), *wanted) != groups.end() ||
-           listed_in_database(peer.uid, *wanted);
+    return group_id_ && (peer.gid == *group_id_ || std::ranges::find(groups, *group_id_) != groups.end());
 }
 
-std::string denial(const Peer& peer, const std::string& method, const std::string& operators_group) {
-    const std::string members = operators_group.empty()
-                                    ? " may (no operators' group is configured)"
-                                    : fmt::format(" and members of group {} may", operators_group);
-    const std::string own = geteuid() == 0 ? "only root" : fmt::format("only root, {}", name_of(geteuid()));
-    return fmt::format("{}: permission denied for {}: {}{}", method, name_of(peer.uid), own, members);
+std::string Operators::denial(const Peer& peer, const std::string& method) const {
+    const std::string own = geteuid() == 0 ? "only root" : fmt::format("only root, {}", own_user_);
+    const std::string members = group_.empty() ? " may (no operators' group is configured)"
+                                : group_id_
+                                    ? fmt::format(" and members of group {} may", group_)
+                                    : fmt::format(
+                                          " may (the operators' group {} was not there when the daemon "
+                                          "started: make it, and restart the daemon)",
+                                          group_);
+    return fmt::format("{}: permission denied for uid {}: {}{}", method, peer.uid, own, members);
 }
 
 }  // namespace thermbal

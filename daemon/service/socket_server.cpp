@@ -104,6 +104,7 @@ struct SocketServer::Parts {
     };
 
     SocketServerOptions options;
+    Operators operators;
     Listener listener;
     Descriptor epoll;
     Descriptor refill_timer;
@@ -300,11 +301,9 @@ std::string SocketServer::Parts::reply_to(Client& client, json_rpc::Call& call) 
         for (const auto& [name, entry] : methods) known += (known.empty() ? "" : ", ") + name;
         return failure(json_rpc::unknown_method, fmt::format("no such method; there are: {}", known));
     }
-    if (method->second.access == Access::changes &&
-        !may_change(client.peer, client.groups, options.operators_group)) {
+    if (method->second.access == Access::changes && !operators.may_change(client.peer, client.groups)) {
         ++counters.denied;
-        return failure(json_rpc::permission_denied,
-                       denial(client.peer, call.method, options.operators_group));
+        return failure(json_rpc::permission_denied, operators.denial(client.peer, call.method));
     }
     auto result = result_of(client, call, method->second);
     if (!result) return failure(code_of(result.error().next), result.error().message);
@@ -413,6 +412,7 @@ Result<SocketServer> SocketServer::open(const SocketServerOptions& options) {
         return fail(NextStep::stop, fmt::format("socket {}: {}", options.path.string(), errno_text(errno)));
     Descriptor spare(::open("/dev/null", O_RDONLY | O_CLOEXEC));
     SocketServer server(std::unique_ptr<Parts>(new Parts{options,
+                                                         Operators(options.operators_group),
                                                          std::move(*listener),
                                                          std::move(epoll),
                                                          std::move(timer),

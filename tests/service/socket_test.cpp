@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 
+#include "name_service.hpp"
 #include "service/socket_server.hpp"
 #include "support.hpp"
 
@@ -175,13 +176,36 @@ TEST_F(SocketTest, OnlyOperatorsMayChangeAnything) {
     const auto denied = json::parse(stop_as(path, 65534, 65534, {}));
     EXPECT_EQ(denied["error"]["code"], -32001);
     EXPECT_EQ(denied["error"]["message"],
-              "stop_test: permission denied for nobody: only root and members of group dialout may");
+              "stop_test: permission denied for uid 65534: only root and members of group dialout may");
     EXPECT_EQ(server.stops, 0);
     EXPECT_TRUE(json::parse(stop_as(path, 65534, 65534, {dialout})).contains("result"))
         << "supplementary group";
     EXPECT_TRUE(json::parse(stop_as(path, 65534, dialout, {})).contains("result")) << "primary group";
     EXPECT_TRUE(LineClient(path).ask(R"({"jsonrpc":"2.0","id":1,"method":"stop_test"})").contains("result"));
     EXPECT_EQ(server.stops, 3);
+}
+
+TEST_F(SocketTest, NoRequestAsksANameService) {
+    if (geteuid() != 0) GTEST_SKIP() << "needs root to become another user";
+    ASSERT_EQ(chmod(folder.path().c_str(), 0755), 0);
+    auto with_group = options();
+    with_group.operators_group = "dialout";
+    const RunningServer server(with_group);
+    const int at_the_start = name_service_calls();
+    EXPECT_GT(at_the_start, 0);
+    EXPECT_EQ(json::parse(stop_as(path, 65534, 65534, {}))["error"]["code"], -32001);
+    EXPECT_EQ(server.stops, 0);
+    EXPECT_EQ(name_service_calls(), at_the_start);
+}
+
+TEST_F(SocketTest, AGroupThatIsNotThereIsSaid) {
+    if (geteuid() != 0) GTEST_SKIP() << "needs root to become another user";
+    ASSERT_EQ(chmod(folder.path().c_str(), 0755), 0);
+    auto with_group = options();
+    with_group.operators_group = "no-such-group";
+    const RunningServer server(with_group);
+    EXPECT_THAT(stop_as(path, 65534, 65534, {}), HasSubstr("group no-such-group was not there"));
+    EXPECT_EQ(server.stops, 0);
 }
 
 TEST_F(SocketTest, ANotificationNeedsPermissionToo) {

@@ -60,7 +60,8 @@ struct SocketServerOptions {
 class SocketServer {
   public:
     /// Takes the socket that systemd passed (sd_listen_fds), or binds `path`. A socket file that nobody
-    /// answers on is removed; one that answers is refused.
+    /// answers on is removed; one that answers is refused. Looks up the operators' group, once: only this
+    /// call may wait for a name service.
     static Result<SocketServer> open(const SocketServerOptions& options);
 
     /// REQUIRES: before the first dispatch; a name once.
