@@ -49,8 +49,10 @@ void Daemon::take_scan(Scan& scan) {
         }
         if (is_measuring(test_.state)) compare_with_model(scan.scan);
         if (is_measuring(test_.state) && over_time(scan)) {
-            stop_machine_and_end(TestEvent::abort, fmt::format("longer than test.max_duration_min = {}",
-                                                               *options_.config.test.max_duration_min));
+            // What is declared is a result, however long somebody wanted to go on measuring.
+            const TestEvent how = test_.state == TestState::declared ? TestEvent::stop : TestEvent::abort;
+            stop_machine_and_end(how, fmt::format("longer than test.max_duration_min = {}",
+                                                  *options_.config.test.max_duration_min));
         }
     }
     log_health_hourly();

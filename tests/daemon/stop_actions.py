@@ -72,7 +72,7 @@ def a_stop_that_fails_is_said():
 
 def keep_measuring_declares_and_goes_on():
     with scratch() as folder, Simulator("--lockstep", "15") as sim:
-        options = {**SOON, "test": {"keep_measuring": True}}
+        options = {**SOON, "test": {"keep_measuring": True, "max_duration_min": 150.0}}
         config = configuration(folder, {"transport": "tcp", "host": "127.0.0.1", "port": sim.port},
                                stop={"action": "write_coil", "line": "module", "unit_id": 1, "address": 0, "value": 0},
                                **options)
@@ -80,9 +80,11 @@ def keep_measuring_declares_and_goes_on():
             status = daemon.wait_for("status", lambda s: s["state"] == "declared", "the declaration", 240)
             scans = status["test"]["scans"]
             daemon.wait_for("status", lambda s: s["test"]["scans"] > scans + 20, "scans after the declaration", 60)
-            daemon.call("stop_test")
-        assert end_of(folder)[0] == "stopped"
-        assert not any(line.startswith("wrote") for line in sim.lines())
+            assert daemon.call("status")["state"] == "declared"
+            wait_until(lambda: end_of(folder)[0] == "stopped", "the longest duration", 120)
+        assert "max_duration_min" in end_of(folder)[1]
+        written = [line for line in sim.lines() if line.startswith("wrote")]
+        assert len(written) == 1, "the machine is stopped, but not before"
 
 
 def by_hand_and_only_when_there_is_a_test():
