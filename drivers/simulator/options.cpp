@@ -1,5 +1,6 @@
 #include "options.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -38,7 +39,7 @@ struct Flags {
     std::string link_path;
     std::string profile = "int16";
     std::string word_order = "abcd";
-    std::string units = "16";
+    std::string units;
     int first_unit = 1;
     std::string foreign_unit = "exception";
     std::vector<std::string> faults;
@@ -64,6 +65,14 @@ std::string known_profiles() {
                              map.open_code, map.short_code);
     }
     return lines;
+}
+
+/// "16", "8,8", "6,6,4": all channels.
+std::string fewest_units(std::size_t most_channels) {
+    std::string units;
+    for (std::size_t left = all_channels; left > 0; left -= std::min(left, most_channels))
+        units += fmt::format("{}{}", units.empty() ? "" : ",", std::min(left, most_channels));
+    return units;
 }
 
 void add_source_flags(CLI::App& app, Flags& flags) {
@@ -120,9 +129,10 @@ void add_line_flags(CLI::App& app, Flags& flags) {
     app.add_option("--word-order", flags.word_order, "Of 32-bit values: abcd, cdab, badc, dcba")
         ->capture_default_str()
         ->group("Line");
-    app.add_option("--units", flags.units,
-                   "Channels of each unit, e.g. 16 or 8,8 or 4,4,4,4; 16,16: two units on the same sensors")
-        ->capture_default_str()
+    app.add_option(
+           "--units", flags.units,
+           "Channels of each unit, e.g. 16 or 8,8 or 4,4,4,4; 16,16: two units on the same sensors; without "
+           "it 16 channels in as few units as the profile allows")
         ->group("Line");
     app.add_option("--first-unit", flags.first_unit, "Id of the first unit; the others follow")
         ->check(CLI::Range(1, 247))
@@ -208,7 +218,8 @@ Result<void> take_module(const Flags& flags, SimulatorOptions& options) {
     }
     map->word_order = *order;
     options.map = std::move(*map);
-    auto units = parse_units(flags.units, flags.first_unit, options.map.most_channels);
+    auto units = parse_units(flags.units.empty() ? fewest_units(options.map.most_channels) : flags.units,
+                             flags.first_unit, options.map.most_channels);
     if (!units) return std::unexpected(units.error());
     options.units = std::move(*units);
     options.foreign_unit = flags.foreign_unit == "silence" ? ForeignUnit::silence : ForeignUnit::exception_11;

@@ -99,7 +99,7 @@ def serves_other_profiles(truth):
             value = struct.unpack(">f", struct.pack(">HH", registers[2 * k + 1], registers[2 * k]))[0]
             expected = truth[f"T{k + 1}"][truth["time_s"].index(3600)]
             assert abs(value - expected) < 1e-5, (k, value, expected)
-    with Simulator("--profile", "mb8art", "--units", "8,8", "--fault", "open:T3@0", "--fault", "short:T9@0") as sim:
+    with Simulator("--profile", "mb8art", "--fault", "open:T3@0", "--fault", "short:T9@0") as sim:
         master = client(sim)
         assert words(master.read_input_registers(0, 8, slave=1))[2] == 30000
         assert words(master.read_input_registers(0, 8, slave=2))[0] == -30000
