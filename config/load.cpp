@@ -152,8 +152,13 @@ class Loader {
 
     void read_network(TableReader& reader, LineConfig& line) {
         reader.require("host", "a name or an IPv4 or IPv6 address");
-        set(line.link.host, reader.text("host"));
-        if (line.link.host.empty()) reader.complain("host", "is empty; accepted: a name or an address");
+        if (const auto host = reader.text("host")) {
+            line.link.host = *host;
+            LinkOptions probe;
+            probe.host = *host;
+            const std::string complaint = check_link_options(probe);
+            if (!complaint.empty()) reader.complain("host", complaint);
+        }
         set(line.link.port, reader.integer("port", {1, 65535}));
         if (const auto ms = reader.number("connect_timeout_ms", {1.0, 60'000.0})) {
             line.link.connect_timeout_s = *ms / 1000.0;

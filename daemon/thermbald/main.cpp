@@ -80,6 +80,22 @@ void give_memory_back(const Config& config) {
     mallopt(M_TRIM_THRESHOLD, 64 * 1024);
 }
 
+/// That the machine can be stopped is seen to before it runs for hours.
+Result<void> check_stop_command(const Config& config, const std::string& file) {
+    if (config.stop.action != StopConfig::Action::command) return {};
+    const std::string& program = config.stop.command.front();
+    std::error_code error;
+    const bool is_file = std::filesystem::is_regular_file(program, error);
+    if (is_file && access(program.c_str(), X_OK) == 0) return {};
+    return fail(
+        NextStep::refuse_input,
+        fmt::format("{}: stop.command: {}: {}; accepted: the full path of a program that thermbald may run",
+                    file, program,
+                    is_file                                   ? "may not be executed"
+                    : std::filesystem::exists(program, error) ? "is no file"
+                                                              : "is not there"));
+}
+
 int refused(const Error& error) {
     fmt::print(stderr, "{}\n", error.message);
     return error.next == NextStep::refuse_input ? 2 : 1;
@@ -143,6 +159,7 @@ int main(int argc, char** argv) {
         const auto model = read_test_model(config->test.model, *config, config->test.inputs);
         if (!model) return refused(model.error());
     }
+    if (const auto runs = check_stop_command(*config, flags.config); !runs) return refused(runs.error());
     if (flags.check) {
         fmt::print("{}", explain_config(*config));
         return 0;

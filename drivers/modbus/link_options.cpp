@@ -30,8 +30,22 @@ std::string check_serial(const LinkOptions& options) {
     return {};
 }
 
+/// One colon separates a port, which has a key of its own; an IPv6 address has two and more, a URL has a
+/// slash.
+bool may_be_host(const std::string& host) {
+    const auto belongs = [](unsigned char c) {
+        return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' ||
+               c == '-' || c == '_' || c == ':' || c == '%';
+    };
+    return !host.empty() && std::ranges::all_of(host, belongs) && std::ranges::count(host, ':') != 1;
+}
+
 std::string check_network(const LinkOptions& options) {
-    if (options.host.empty()) return "host is empty; a name or an IPv4 or IPv6 address";
+    if (!may_be_host(options.host)) {
+        return fmt::format(
+            "host is \"{}\"; a name or an IPv4 or IPv6 address, the port is a setting of its own",
+            options.host);
+    }
     if (options.port < 1 || options.port > 65535) return fmt::format("port is {}; 1 to 65535", options.port);
     return {};
 }

@@ -720,6 +720,15 @@ TEST(LinkOptions, RefusesWhatNoLineCanHave) {
     options.port = 0;
     EXPECT_THAT(check_link_options(options), HasSubstr("port is 0"));
     options = {};
+    for (const char* host : {"10.0.0.7", "module-3.hall_2", "::1", "fe80::1%eth0", "2001:db8::7"}) {
+        options.host = host;
+        EXPECT_EQ(check_link_options(options), "") << host;
+    }
+    for (const char* host : {"", "127.0.0.1:502", "http://x", "a b", "[::1]", "x\n"}) {
+        options.host = host;
+        EXPECT_THAT(check_link_options(options), HasSubstr("host is")) << host;
+    }
+    options = {};
     options.transport = Transport::rtu;
     EXPECT_THAT(check_link_options(options), HasSubstr("device is empty"));
     options.device = "/dev/ttyUSB0";
