@@ -55,7 +55,15 @@ void print_table(const OfflineOptions& options, const std::vector<ChannelVerdict
 int run_identify(const OfflineOptions& options) {
     auto input = read_input(options);
     if (!input) return report_error(input.error());
-    if (options.until_min) input->window = window_until(input->window, *options.until_min * 60.0);
+    if (options.until_min) {
+        const double first_min = input->window.start_s / 60.0;
+        if (*options.until_min < first_min) {
+            return report_error(
+                {NextStep::refuse_input, fmt::format("--until-min {}: {} begins at {:.2f} min",
+                                                     *options.until_min, options.file, first_min)});
+        }
+        input->window = window_until(input->window, *options.until_min * 60.0);
+    }
     if (!options.modes_only) input->flow.sweep_when = SweepWhen::always;
     std::set<std::string>
         unwanted;  // the others are estimated, the shared time constants need them, but not swept
