@@ -16,6 +16,7 @@
 #include "abort_test.hpp"
 #include "config/load.hpp"
 #include "daemon.hpp"
+#include "manual/flags.hpp"
 #include "manual/manual.hpp"
 #include "model_watch.hpp"
 #include "version.hpp"
@@ -114,7 +115,7 @@ int main(int argc, char** argv) {
                  "end when a test has ended (demonstrations, tests)");
     CLI::Option_group& time = *app.add_option_group("time", "Faster than time, with a simulated module:");
     auto* scale = time.add_option("--time-scale", flags.time_scale, "run the clock so many times as fast")
-                      ->check(CLI::Range(0.01, 100000.0));
+                      ->check(number_in(0.01, 100000.0));
     time.add_option("--time-epoch-ns", flags.time_epoch_ns, "CLOCK_MONOTONIC at which the scaled time is 0")
         ->needs(scale);
     time.add_flag("--lockstep", flags.lockstep, "the next scan is due when the work of the last one is done")
