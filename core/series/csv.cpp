@@ -8,6 +8,7 @@
 
 #include "series/recorded_test.hpp"
 #include "series/sample.hpp"
+#include "series/temperature.hpp"
 
 namespace thermbal {
 namespace {
@@ -209,6 +210,13 @@ Result<RecordedTest> parse_recorded_test(std::string_view csv_text, std::string_
                                           cell.text));
             }
             const auto [is_channel, index] = target[i - 1];
+            if (is_channel && !std::isnan(*value) && !is_temperature(*value)) {
+                return refuse(
+                    name, cell.line, cell.column,
+                    fmt::format("{} is {} C, which is no temperature ({} to {} C); leave the cell empty "
+                                "where there is no reading",
+                                (*header)[i].text, cell.text, absolute_zero_C, hottest_reading_C));
+            }
             (is_channel ? test.channels : test.inputs)[index].values.push_back(*value);
         }
     }
