@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <set>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/standard_streams.hpp"
 #include "compute/threads.hpp"
 #include "offline_input.hpp"
 #include "output.hpp"
@@ -31,9 +32,9 @@ json channels_json(const OfflineOptions& options, const std::vector<ChannelVerdi
     return list;
 }
 
-void print_table(const OfflineOptions& options, const std::vector<ChannelVerdict>& verdicts) {
-    fmt::print("{:<6} {:<14} {:>9} {:>4} {:>8} {:>9} {:>17} {:>9}  {}\n", "", "state", "declared", "n",
-               "RMSE", "settles", "90 % interval", "95 % at", "reason");
+std::string table_text(const OfflineOptions& options, const std::vector<ChannelVerdict>& verdicts) {
+    std::string text = fmt::format("{:<6} {:<14} {:>9} {:>4} {:>8} {:>9} {:>17} {:>9}  {}\n", "", "state",
+                                   "declared", "n", "RMSE", "settles", "90 % interval", "95 % at", "reason");
     const auto number = [](double value, const char* unit, int digits) {
         return std::isfinite(value) ? fmt::format("{:.{}f} {}", value, digits, unit) : std::string("-");
     };
@@ -43,11 +44,13 @@ void print_table(const OfflineOptions& options, const std::vector<ChannelVerdict
             std::isfinite(v.steady_state_low_C)
                 ? fmt::format("{:.2f} .. {:.2f} C", v.steady_state_low_C, v.steady_state_high_C)
                 : "-";
-        fmt::print("{:<6} {:<14} {:>9} {:>4} {:>8} {:>9} {:>17} {:>9}  {}\n", v.channel, to_string(v.state),
-                   number(v.declared_at_min, "min", 1), v.n > 0 ? std::to_string(v.n) : "-",
-                   number(v.window_rmse_C, "C", 3), number(v.steady_state_C, "C", 2), interval,
-                   number(v.equilibrium_time_min, "min", 0), v.reason);
+        text += fmt::format("{:<6} {:<14} {:>9} {:>4} {:>8} {:>9} {:>17} {:>9}  {}\n", v.channel,
+                            to_string(v.state), number(v.declared_at_min, "min", 1),
+                            v.n > 0 ? std::to_string(v.n) : "-", number(v.window_rmse_C, "C", 3),
+                            number(v.steady_state_C, "C", 2), interval,
+                            number(v.equilibrium_time_min, "min", 0), v.reason);
     }
+    return text;
 }
 
 }  // namespace
@@ -78,15 +81,13 @@ int run_identify(const OfflineOptions& options) {
     progress.reset();
     if (!verdict) return report_error(verdict.error());
     if (options.json) {
-        fmt::print("{}\n", json{{"window_end_min", verdict->window_end_min},
-                                {"regime_since_min", verdict->regime_since_min},
-                                {"channels", channels_json(options, verdict->channels)}}
-                               .dump(2));
-    } else {
-        fmt::print("window: {:.2f} to {:.2f} min\n", verdict->regime_since_min, verdict->window_end_min);
-        print_table(options, verdict->channels);
+        return print_json({{"window_end_min", verdict->window_end_min},
+                           {"regime_since_min", verdict->regime_since_min},
+                           {"channels", channels_json(options, verdict->channels)}});
     }
-    return 0;
+    return print_text(
+        fmt::format("window: {:.2f} to {:.2f} min\n", verdict->regime_since_min, verdict->window_end_min) +
+        table_text(options, verdict->channels));
 }
 
 int run_learn(const LearnOptions& options) {
@@ -114,8 +115,10 @@ int run_learn(const LearnOptions& options) {
                                                .created_wall_ns = options.now_wall_ns,
                                                .spectrum_json = spectrum_to_json(*verdict->spectrum).dump()});
         if (!id) return report_error(id.error());
-        fmt::print("{}: {:.0f} min of {} are in {}\n", file, verdict->window_end_min,
-                   options.machine.empty() ? "a machine without name" : options.machine, options.archive);
+        const int failed = print_text(
+            fmt::format("{}: {:.0f} min of {} are in {}\n", file, verdict->window_end_min,
+                        options.machine.empty() ? "a machine without name" : options.machine, options.archive));
+        if (failed != 0) return failed;
     }
     return 0;
 }
@@ -126,8 +129,9 @@ int run_replay(const OfflineOptions& options) {
     std::optional<Progress> progress("replay");
     const auto tell = [&](const ReplayChange& one) {
         if (options.json) return;
-        fmt::print("{:7.2f} min  {} {}: {}\n", one.at_min, one.change.channel, to_string(one.change.kind),
-                   one.change.reason);
+        // Said as it happens; whether it was taken is asked at the end.
+        std::ignore = print_out(fmt::format("{:7.2f} min  {} {}: {}\n", one.at_min, one.change.channel,
+                                            to_string(one.change.kind), one.change.reason));
     };
     const auto done = replay(*input, options, tell, *progress);
     progress.reset();
@@ -140,22 +144,19 @@ int run_replay(const OfflineOptions& options) {
                                {"change", to_string(one.change.kind)},
                                {"reason", one.change.reason}});
         }
-        fmt::print("{}\n", json{{"test_stopped_at_min", number_or_null(done->stopped_at_min)},
-                                {"reason", done->decision.reason},
-                                {"archive_dropped", done->archive_dropped},
-                                {"changes", std::move(changes)},
-                                {"channels", channels_json(options, done->channels)}}
-                               .dump(2));
-        return 0;
+        return print_json({{"test_stopped_at_min", number_or_null(done->stopped_at_min)},
+                           {"reason", done->decision.reason},
+                           {"archive_dropped", done->archive_dropped},
+                           {"changes", std::move(changes)},
+                           {"channels", channels_json(options, done->channels)}});
     }
     const double end_min = input->window.end_s() / 60.0;
-    print_table(options, done->channels);
-    fmt::print("{}\n",
-               std::isfinite(done->stopped_at_min)
-                   ? fmt::format("test stopped at {:.2f} of {:.2f} min: {}", done->stopped_at_min, end_min,
-                                 done->decision.reason)
-                   : fmt::format("test not stopped in {:.2f} min: {}", end_min, done->decision.reason));
-    return 0;
+    const std::string ending =
+        std::isfinite(done->stopped_at_min)
+            ? fmt::format("test stopped at {:.2f} of {:.2f} min: {}\n", done->stopped_at_min, end_min,
+                          done->decision.reason)
+            : fmt::format("test not stopped in {:.2f} min: {}\n", end_min, done->decision.reason);
+    return print_text(table_text(options, done->channels) + ending);
 }
 
 }  // namespace thermbal

@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "abort_test.hpp"
+#include "base/standard_streams.hpp"
 #include "config/load.hpp"
 #include "daemon.hpp"
 #include "manual/flags.hpp"
@@ -82,8 +83,13 @@ void give_memory_back(const Config& config) {
 }
 
 int refused(const Error& error) {
-    fmt::print(stderr, "{}\n", error.message);
+    print_error_line(error.message);
     return error.next == NextStep::refuse_input ? 2 : 1;
+}
+
+int answered(const std::string& text) {
+    const auto printed = print_out(text);
+    return printed ? 0 : refused(printed.error());
 }
 
 }  // namespace
@@ -91,6 +97,7 @@ int refused(const Error& error) {
 // What nobody expects to be thrown ends the program with what it says.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
+    keep_standard_streams();
     CLI::App app(
         "Polls a temperature module during a thermal-balance test, declares where each channel will settle, "
         "and stops "
@@ -128,7 +135,7 @@ int main(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : 2;
+        return app.exit(error) == 0 ? answered("") : 2;
     }
     flags.check = check->count() > 0;
     if (!checked_file.empty()) flags.config = checked_file;
@@ -144,17 +151,13 @@ int main(int argc, char** argv) {
         const auto model = read_test_model(config->test.model, *config, config->test.inputs);
         if (!model) return refused(model.error());
     }
-    if (flags.check) {
-        fmt::print("{}", explain_config(*config));
-        return 0;
-    }
+    if (flags.check) return answered(explain_config(*config));
 
     if (flags.abort_test) {
         const auto clock = system_clock();
         const auto done = abort_open_test(config->store.path, {clock->wall_ns(), clock->monotonic_ns()});
         if (!done) return refused(done.error());
-        fmt::print("{}\n", *done);
-        return 0;
+        return answered(*done + "\n");
     }
 
     spdlog::set_default_logger(spdlog::stderr_logger_mt("thermbald"));

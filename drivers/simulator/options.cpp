@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "base/standard_streams.hpp"
 #include "manual/flags.hpp"
 #include "manual/manual.hpp"
 #include "simulator/scenario.hpp"
@@ -300,6 +301,14 @@ Result<SimulatorOptions> checked(const Flags& flags) {
     return options;
 }
 
+/// What --help and --version printed may have met a full disk.
+int answered(int status) {
+    const auto printed = print_out("");
+    if (printed) return status;
+    print_error_line("thermbal-sim: " + printed.error().message);
+    return 1;
+}
+
 }  // namespace
 
 Result<std::vector<ModuleUnit>> parse_units(const std::string& text, int first_id,
@@ -355,13 +364,13 @@ ParsedCommandLine parse_command_line(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        if (error.get_exit_code() == 0) return {.options = {}, .exit_status = app.exit(error)};
-        fmt::print(stderr, "thermbal-sim: {}; see --help\n", error.what());
+        if (error.get_exit_code() == 0) return {.options = {}, .exit_status = answered(app.exit(error))};
+        print_error_line(fmt::format("thermbal-sim: {}; see --help", error.what()));
         return {.options = {}, .exit_status = 2};
     }
     auto options = checked(flags);
     if (!options) {
-        fmt::print(stderr, "thermbal-sim: {}\n", options.error().message);
+        print_error_line("thermbal-sim: " + options.error().message);
         return {.options = {}, .exit_status = 2};
     }
     return {.options = std::move(*options), .exit_status = 0};
