@@ -69,6 +69,13 @@ class Offline(unittest.TestCase):
             self.assertEqual(run("thermbal-sim", "--port", "x", to=to).returncode, 2)
             self.assertEqual(run("thermbald", "--check-config", "nothing.toml", to=to).returncode, 2)
 
+    def test_the_last_scan_ends_a_window_however_long_the_steps_are(self):
+        made = run("thermbalctl", "replay", self.short, "--modes-only", "--every-min", 60, "--json")
+        answer = json.loads(made.stdout)
+        self.assertEqual([(channel["channel"], channel["declared"]) for channel in answer["channels"]], [("T2", False)])
+        self.assertIn("enough_samples: 1.0 min", answer["channels"][0]["reason"])
+        self.assertEqual(answer["reason"], "waiting for T2")
+
     def settled(self):
         """Two channels over ten of their time constants."""
         rows = "".join(f"{60 * k},18,{28 - 10 * 0.9 ** k + 0.01 * (k % 3):.2f},{23 - 5 * 0.95 ** k + 0.01 * (k % 5):.2f}\n"
