@@ -76,6 +76,12 @@ class Offline(unittest.TestCase):
         self.assertIn("enough_samples: 1.0 min", answer["channels"][0]["reason"])
         self.assertEqual(answer["reason"], "waiting for T2")
 
+    def test_the_room_is_not_identified(self):
+        for command in ("identify", "replay"):
+            self.refused(run("thermbalctl", command, self.short, "--channel", "T1"), "--channel T1: it measures the room")
+        self.assertEqual(run("thermbalctl", "identify", self.short, "--channel", "T1", "--ambient", "none",
+                             "--modes-only").returncode, 0)
+
     def settled(self):
         """Two channels over ten of their time constants."""
         rows = "".join(f"{60 * k},18,{28 - 10 * 0.9 ** k + 0.01 * (k % 3):.2f},{23 - 5 * 0.95 ** k + 0.01 * (k % 5):.2f}\n"
