@@ -82,6 +82,14 @@ class Offline(unittest.TestCase):
         self.assertEqual(run("thermbalctl", "identify", self.short, "--channel", "T1", "--ambient", "none",
                              "--modes-only").returncode, 0)
 
+    def test_the_room_alone_is_compared_with_no_model(self):
+        model = SOURCE / "config/models/vertical_machining_centre.toml"
+        rows = "".join(f"{15 * k},18,5000,\n" for k in range(60))
+        for name, header in (("room.csv", "time_s,T1,spindle_rpm,note\n"), ("silent.csv", "time_s,T1,spindle_rpm,T2\n")):
+            room = self.file(name, header + rows)
+            for command in ("diagnose", "calibrate"):
+                self.refused(run("thermbalctl", command, room, "--model", model), "so nothing can be compared")
+
     def settled(self):
         """Two channels over ten of their time constants."""
         rows = "".join(f"{60 * k},18,{28 - 10 * 0.9 ** k + 0.01 * (k % 3):.2f},{23 - 5 * 0.95 ** k + 0.01 * (k % 5):.2f}\n"
