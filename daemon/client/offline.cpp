@@ -1,8 +1,10 @@
 #include "offline.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
+#include <string_view>
 #include <tuple>
 
 #include <fmt/format.h>
@@ -53,6 +55,55 @@ std::string table_text(const OfflineOptions& options, const std::vector<ChannelV
     return text;
 }
 
+/// What a recording leaves for the archive.
+struct Lesson {
+    ArchivedSpectrum spectrum;
+    double length_min = 0.0;
+};
+
+/// The guard that says of this channel that its end is not known yet; nullptr where it is, or where the
+/// sensor is broken. Of the newest samples and the room nothing is asked: they matter to a declaration, not
+/// to a lesson.
+const Guard* not_known_yet(const ChannelVerdict& verdict) {
+    constexpr std::array<std::string_view, 3> of_the_end{"interval_within_tolerance",
+                                                         "slowest_seen_long_enough", "most_of_the_rise_seen"};
+    const auto failed = std::ranges::find_if(verdict.guards, [&](const Guard& guard) {
+        return !guard.passed && std::ranges::find(of_the_end, guard.name) != of_the_end.end();
+    });
+    return failed == verdict.guards.end() ? nullptr : &*failed;
+}
+
+/// A recording teaches what it knows at its end: an unsettled one would teach a guess, and later tests would
+/// be declared on it.
+Result<Lesson> lesson_of(const std::string& file, const std::string& ambient) {
+    OfflineOptions options;
+    options.file = file;
+    options.ambient = ambient;
+    options.modes_only = true;
+    const auto input = read_input(options);
+    if (!input) return std::unexpected(input.error());
+    auto verdict =
+        LiveFlow(input->flow).identify(input->window, {}, parallel_on_threads(1, false), not_cancelled);
+    if (!verdict) return std::unexpected(verdict.error());
+    if (!verdict->spectrum) {
+        return fail(
+            NextStep::refuse_input,
+            fmt::format("{}: the machine's inputs change during the test, or it is too short; expected "
+                        "one regime, measured until it has settled",
+                        file));
+    }
+    for (const ChannelVerdict& channel : verdict->channels) {
+        const Guard* const unknown = not_known_yet(channel);
+        if (unknown == nullptr) continue;
+        return fail(
+            NextStep::refuse_input,
+            fmt::format("{}: ends at {:.0f} min, where {} is not known yet ({}); only a recording that has "
+                        "settled teaches. Measure on; thermbalctl identify says how far each channel is",
+                        file, verdict->window_end_min, channel.channel, unknown->figures));
+    }
+    return Lesson{std::move(*verdict->spectrum), verdict->window_end_min};
+}
+
 }  // namespace
 
 int run_identify(const OfflineOptions& options) {
@@ -91,36 +142,28 @@ int run_identify(const OfflineOptions& options) {
 }
 
 int run_learn(const LearnOptions& options) {
-    OfflineOptions one;
-    one.ambient = options.ambient;
+    std::vector<Lesson> lessons;
+    for (const std::string& file : options.files) {
+        auto lesson = lesson_of(file, options.ambient);
+        if (!lesson) return report_error(lesson.error());
+        lessons.push_back(std::move(*lesson));
+    }
     auto store = Store::open(options.archive, {options.now_wall_ns, 0});
     if (!store) return report_error(store.error());
-    for (const std::string& file : options.files) {
-        one.file = file;
-        const auto input = read_input(one);
-        if (!input) return report_error(input.error());
-        FlowOptions flow = input->flow;
-        flow.sweep_when = SweepWhen::never;
-        const auto verdict =
-            LiveFlow(flow).identify(input->window, {}, parallel_on_threads(1, false), not_cancelled);
-        if (!verdict) return report_error(verdict.error());
-        if (!verdict->spectrum) {
-            return report_error(
-                {NextStep::refuse_input,
-                 fmt::format("{}: the machine's inputs change during the test; expected one regime", file)});
-        }
-        const auto id = store->record_archive({.id = 0,
-                                               .machine = options.machine,
-                                               .test_id = {},
-                                               .created_wall_ns = options.now_wall_ns,
-                                               .spectrum_json = spectrum_to_json(*verdict->spectrum).dump()});
+    std::string text;
+    for (std::size_t i = 0; i < lessons.size(); ++i) {
+        const auto id =
+            store->record_archive({.id = 0,
+                                   .machine = options.machine,
+                                   .test_id = {},
+                                   .created_wall_ns = options.now_wall_ns,
+                                   .spectrum_json = spectrum_to_json(lessons[i].spectrum).dump()});
         if (!id) return report_error(id.error());
-        const int failed = print_text(
-            fmt::format("{}: {:.0f} min of {} are in {}\n", file, verdict->window_end_min,
-                        options.machine.empty() ? "a machine without name" : options.machine, options.archive));
-        if (failed != 0) return failed;
+        text += fmt::format("{}: {:.0f} min of {} are in {}\n", options.files[i], lessons[i].length_min,
+                            options.machine.empty() ? "a machine without name" : options.machine,
+                            options.archive);
     }
-    return 0;
+    return print_text(text);
 }
 
 int run_replay(const OfflineOptions& options) {

@@ -96,6 +96,17 @@ class Offline(unittest.TestCase):
                        for k in range(200))
         return self.file("settled.csv", "time_s,T1,T2,T3\n" + rows)
 
+    def test_only_a_recording_that_has_settled_teaches(self):
+        settled = self.settled()
+        early = self.file("early.csv", "".join(settled.read_text().splitlines(keepends=True)[:25]))
+        archive = Path(self.folder.name) / "archive.db"
+        made = run("thermbalctl", "learn", settled, early, "--archive", archive)
+        self.refused(made, "early.csv: ends at 23 min, where T")
+        self.assertFalse(archive.exists(), "half of it was learned")
+        made = run("thermbalctl", "learn", settled, "--archive", archive, "--machine", "M")
+        self.assertEqual((made.returncode, made.stderr), (0, ""))
+        self.assertIn("199 min of M are in", made.stdout)
+
 
 class Asked(DaemonCase):
     def test_an_answer_does_not_go_into_the_socket_where_standard_output_is_closed(self):
