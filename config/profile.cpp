@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include "config/load.hpp"
+#include "series/temperature.hpp"
 #include "toml_reader.hpp"
 
 namespace thermbal {
@@ -96,8 +97,8 @@ void read_map(TableReader& reader, ModuleProfile& profile) {
     }
     set(profile.scale, reader.number("scale", any_number));
     set(profile.offset_C, reader.number("offset_C", any_number));
-    set(profile.valid_min_C, reader.number("valid_min_C", any_number));
-    set(profile.valid_max_C, reader.number("valid_max_C", any_number));
+    set(profile.valid_min_C, reader.number("valid_min_C", {absolute_zero_C, hottest_reading_C}));
+    set(profile.valid_max_C, reader.number("valid_max_C", {absolute_zero_C, hottest_reading_C}));
     set(profile.nan_quality, fault_quality(reader, "nan"));
 }
 

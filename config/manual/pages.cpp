@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cctype>
+#include <cstdio>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -106,7 +107,7 @@ void add_manual_flags(CLI::App& app, const ManualPage& page) {
     const auto hidden = [&](const char* flag, auto make_text) {
         app.add_flag_callback(flag,
                               [&app, make_text] {
-                                  fmt::print("{}", make_text(app));
+                                  std::fputs(make_text(app).c_str(), stdout);
                                   throw CLI::Success();
                               })
             ->group("")

@@ -156,20 +156,21 @@ double bin_width_s(const RecordedTest& test, double wanted_s) {
 
 Result<Observation> observe(const Model& model, const RecordedTest& test, double bin_s) {
     Observation seen;
+    bool machine_is_measured = false;  // the room alone is an input, and agrees with any model
     for (std::size_t i = 0; i < model.sensors.size(); ++i) {
         const Column* column = find_channel(test, model.sensors[i].channel);
         if (column == nullptr) continue;
         if (std::ranges::none_of(column->values, [](double value) { return std::isfinite(value); })) continue;
         seen.sensors.push_back(i);
         seen.channels.push_back(model.sensors[i].channel);
+        machine_is_measured = machine_is_measured || model.sensors[i].node != ambient_node;
     }
-    if (seen.sensors.empty() || test.time_s.size() < 3) {
-        return fail(
-            NextStep::refuse_input,
-            fmt::format(
-                "no sensor of the model \"{}\" is measured in the test; expected columns named as its "
-                "[[sensor]] channels, at least three rows",
-                model.name));
+    if (!machine_is_measured || test.time_s.size() < 3) {
+        return fail(NextStep::refuse_input,
+                    fmt::format("no sensor on the machine of the model \"{}\" is measured in the test, so "
+                                "nothing can be compared; "
+                                "expected columns named as its [[sensor]] channels, at least three rows",
+                                model.name));
     }
     const Bins bins = make_bins(test.time_s, bin_s);
     seen.bin_s = bin_s;

@@ -8,6 +8,7 @@
 
 #include "series/recorded_test.hpp"
 #include "series/sample.hpp"
+#include "series/temperature.hpp"
 
 namespace thermbal {
 namespace {
@@ -102,6 +103,11 @@ std::optional<double> parse_cell(std::string_view text) {
     return value;
 }
 
+/// On the grid of its scans a recording with gaps is longer than its rows. So many scans are always taken (a
+/// week at 1 s is 604 800, a month at 15 s 178 560), and of more rows twice as many.
+constexpr std::size_t always_taken_scans = 1'000'000;
+constexpr std::size_t most_scans_per_row = 2;
+
 constexpr std::string_view bad_quotes = "a quoted cell is not closed, or text follows its closing quote";
 
 /// As a cell of RFC 4180.
@@ -115,6 +121,26 @@ std::string quoted_where_needed(const std::string& text) {
 std::unexpected<Error> refuse(std::string_view name, std::size_t line, std::size_t column,
                               std::string_view what) {
     return fail(NextStep::refuse_input, fmt::format("{}:{}:{}: {}", name, line, column, what));
+}
+
+/// A time that lies far off would make a grid that no memory holds. `lines`: of each row.
+Result<void> check_span(const RecordedTest& test, const std::vector<std::size_t>& lines,
+                        std::string_view name) {
+    if (test.time_s.size() < 2) return {};
+    const double period_s = median_step_s(test);
+    const double scans = (test.time_s.back() - test.time_s.front()) / period_s;
+    const auto most =
+        static_cast<double>(std::max(always_taken_scans, most_scans_per_row * test.time_s.size()));
+    if (scans <= most) return {};
+    std::size_t far = 1;
+    for (std::size_t row = 2; row < test.time_s.size(); ++row) {
+        if (test.time_s[row] - test.time_s[row - 1] > test.time_s[far] - test.time_s[far - 1]) far = row;
+    }
+    return refuse(
+        name, lines[far], 1,
+        fmt::format("time_s is {} after {}; with a row each {:.6g} s (median) the recording would be "
+                    "{:.4g} scans long, {:.0f} are taken. Mend the time, or split the file here",
+                    test.time_s[far], test.time_s[far - 1], period_s, scans, most));
 }
 
 }  // namespace
@@ -154,6 +180,7 @@ Result<RecordedTest> parse_recorded_test(std::string_view csv_text, std::string_
         columns.push_back({cell.text, {}});
     }
 
+    std::vector<std::size_t> lines;
     while (!reader.at_end()) {
         const auto record = reader.next();
         if (!record) return refuse(name, reader.line(), 1, bad_quotes);
@@ -173,6 +200,7 @@ Result<RecordedTest> parse_recorded_test(std::string_view csv_text, std::string_
                                       test.time_s.back()));
         }
         test.time_s.push_back(*time_s);
+        lines.push_back(first.line);
         for (std::size_t i = 1; i < record->size(); ++i) {
             const Cell& cell = (*record)[i];
             const auto value = parse_cell(cell.text);
@@ -182,10 +210,18 @@ Result<RecordedTest> parse_recorded_test(std::string_view csv_text, std::string_
                                           cell.text));
             }
             const auto [is_channel, index] = target[i - 1];
+            if (is_channel && !std::isnan(*value) && !is_temperature(*value)) {
+                return refuse(
+                    name, cell.line, cell.column,
+                    fmt::format("{} is {} C, which is no temperature ({} to {} C); leave the cell empty "
+                                "where there is no reading",
+                                (*header)[i].text, cell.text, absolute_zero_C, hottest_reading_C));
+            }
             (is_channel ? test.channels : test.inputs)[index].values.push_back(*value);
         }
     }
     if (test.time_s.empty()) return refuse(name, reader.line(), 1, "the header is there, no row follows it");
+    if (auto sound = check_span(test, lines, name); !sound) return std::unexpected(sound.error());
     return test;
 }
 

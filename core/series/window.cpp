@@ -41,6 +41,7 @@ const Column* TestWindow::input(std::string_view input_name) const {
 
 std::size_t TestWindow::scans_until(double until_s) const {
     const double count = std::floor((until_s - start_s) / period_s + grid_slack) + 1.0;
+    if (!(count > 0.0)) return 0;  // NaN, too
     return static_cast<std::size_t>(std::clamp(count, 0.0, static_cast<double>(scans)));
 }
 
@@ -99,7 +100,9 @@ TestWindow window_until(const TestWindow& window, double until_s) {
 
 TestWindow window_from(const TestWindow& window, double from_s) {
     const double skipped = std::ceil((from_s - window.start_s) / window.period_s - grid_slack);
-    const auto first = static_cast<std::size_t>(std::clamp(skipped, 0.0, static_cast<double>(window.scans)));
+    const std::size_t first = skipped < static_cast<double>(window.scans)
+                                  ? static_cast<std::size_t>(std::max(skipped, 0.0))
+                                  : window.scans;
     return slice(window, first, window.scans - first);
 }
 

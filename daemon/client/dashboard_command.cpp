@@ -56,9 +56,11 @@ int run_dashboard(const DashboardCommand& command) {
     auto server = DashboardServer::open(*options, state);
     if (!server) return report_error(server.error());
     const bool is_v6 = options->address.host.find(':') != std::string::npos;
-    fmt::print("http://{}:{}/\n", is_v6 ? "[" + options->address.host + "]" : options->address.host,
-               server->port());
-    std::fflush(stdout);
+    if (const int failed = print_text(
+            fmt::format("http://{}:{}/\n", is_v6 ? "[" + options->address.host + "]" : options->address.host,
+                        server->port()));
+        failed != 0)
+        return failed;
     const std::jthread follower([&state](const std::stop_token& stop) { state.follow(stop); });
     const std::jthread serving([&server] { server->run(); });
     int signal = 0;

@@ -136,16 +136,13 @@ int run_verify(const DatabaseOptions& options) {
         json rows = json::array();
         for (const Finding& finding : *findings)
             rows.push_back({{"where", finding.where}, {"what", finding.what}});
-        print_json({{"sound", findings->empty()}, {"findings", std::move(rows)}});
-    } else if (findings->empty()) {
-        print_text("sound\n");
-    } else {
-        std::string lines;
-        for (const Finding& finding : *findings)
-            lines += printable(finding.where + ": " + finding.what) + "\n";
-        print_text(lines);
+        const int failed = print_json({{"sound", findings->empty()}, {"findings", std::move(rows)}});
+        return findings->empty() ? failed : 1;
     }
-    return findings->empty() ? 0 : 1;
+    std::string lines = findings->empty() ? "sound\n" : "";
+    for (const Finding& finding : *findings) lines += printable(finding.where + ": " + finding.what) + "\n";
+    const int failed = print_text(lines);
+    return findings->empty() ? failed : 1;
 }
 
 int run_backup(const DatabaseOptions& options, const std::string& copy) {

@@ -2,6 +2,7 @@
 
 #include "commands.hpp"
 #include "database.hpp"
+#include "manual/flags.hpp"
 #include "serial_ports.hpp"
 #include "track_record.hpp"
 
@@ -71,7 +72,7 @@ void add_track_record(CLI::App& app, int& status) {
         .add_option("--tolerance-C", options->tolerance_C,
                     "how close a prediction has to be for the earliest honest time")
         ->capture_default_str()
-        ->check(CLI::Range(0.01, 10.0));
+        ->check(number_in(0.01, 10.0));
     add_database_flags(command, options->database);
     add_json_flag(command, options->database.ask.json);
     command.callback([&status, options] { status = run_track_record(*options); });

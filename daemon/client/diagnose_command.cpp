@@ -80,32 +80,34 @@ Result<void> write_results(const DiagnoseCommand& command, const Diagnosis& diag
     return write_file(command.report, gap_report_html(diagnosis));
 }
 
-void print_text(const Diagnosis& diagnosis) {
-    fmt::print("{}: {}\n", to_string(diagnosis.verdict), diagnosis.reason);
-    fmt::print("{:<30} {:>9} {:>9}\n", "run", "before", "after");
-    const auto line = [](const RunComparison& run) {
-        fmt::print("{:<30} {:>7.3f} C {:>7.3f} C\n", run.name, run.before_rmse_C, run.after_rmse_C);
+std::string as_text(const Diagnosis& diagnosis) {
+    std::string text = fmt::format("{}: {}\n", to_string(diagnosis.verdict), diagnosis.reason);
+    text += fmt::format("{:<30} {:>9} {:>9}\n", "run", "before", "after");
+    const auto line = [&text](const RunComparison& run) {
+        text += fmt::format("{:<30} {:>7.3f} C {:>7.3f} C\n", run.name, run.before_rmse_C, run.after_rmse_C);
     };
     line(diagnosis.run);
     for (const RunComparison& run : diagnosis.holdouts) line(run);
     for (const FoundEffect& found : diagnosis.effects) {
-        fmt::print("{} ({:.0f} %)\n", effect_in_words(found), 100.0 * found.probability);
+        text += fmt::format("{} ({:.0f} %)\n", effect_in_words(found), 100.0 * found.probability);
         for (const Suspect& other : found.alternatives) {
-            fmt::print("  or {} at {} ({:.0f} %)\n",
-                       other.kind.empty() ? "something without a name" : other.kind, other.at,
-                       100.0 * other.probability);
+            text += fmt::format("  or {} at {} ({:.0f} %)\n",
+                                other.kind.empty() ? "something without a name" : other.kind, other.at,
+                                100.0 * other.probability);
         }
         for (const SeparatingExperiment* one : clearest_experiments(found)) {
             if (one->separates)
-                fmt::print("  to tell it from {} at {}: {}; {} would differ by {:.2f} C\n", one->against,
-                           one->against_at, in_words(one->kind), one->channel, one->difference_C);
+                text +=
+                    fmt::format("  to tell it from {} at {}: {}; {} would differ by {:.2f} C\n", one->against,
+                                one->against_at, in_words(one->kind), one->channel, one->difference_C);
         }
     }
     for (const ResidualHeat& heat : diagnosis.residual_heat) {
-        fmt::print("what is missing looks like {} at {}, {:.0f} to {:.0f} min, following {}\n",
-                   heat.of_sensor ? "an error of the sensor" : "heat", heat.at, heat.from_s / 60.0,
-                   heat.to_s / 60.0, heat.follows);
+        text += fmt::format("what is missing looks like {} at {}, {:.0f} to {:.0f} min, following {}\n",
+                            heat.of_sensor ? "an error of the sensor" : "heat", heat.at, heat.from_s / 60.0,
+                            heat.to_s / 60.0, heat.follows);
     }
+    return text;
 }
 
 }  // namespace
@@ -115,9 +117,7 @@ int run_diagnose(const DiagnoseCommand& command) {
     if (!diagnosis) return report_error(diagnosis.error());
     if (const auto written = write_results(command, *diagnosis); !written)
         return report_error(written.error());
-    if (command.json) return print_json(diagnosis_to_json(*diagnosis));
-    print_text(*diagnosis);
-    return 0;
+    return command.json ? print_json(diagnosis_to_json(*diagnosis)) : print_text(as_text(*diagnosis));
 }
 
 }  // namespace thermbal

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "base/standard_streams.hpp"
 #include "config/load.hpp"
 
 namespace thermbal {
@@ -21,11 +22,10 @@ Result<std::string> read_file(const std::string& path) {
 }
 
 Result<void> write_file(const std::string& path, std::string_view content) {
-    const bool to_standard_output = path == "-";
-    const File file(to_standard_output ? nullptr : std::fopen(path.c_str(), "wb"), std::fclose);
-    std::FILE* const out = to_standard_output ? stdout : file.get();
-    if (out == nullptr || std::fwrite(content.data(), 1, content.size(), out) != content.size() ||
-        std::fflush(out) != 0) {
+    if (path == "-") return print_out(content);
+    const File file(std::fopen(path.c_str(), "wb"), std::fclose);
+    if (!file || std::fwrite(content.data(), 1, content.size(), file.get()) != content.size() ||
+        std::fflush(file.get()) != 0) {
         return fail(NextStep::stop, fmt::format("{}: {}", path, strerrordesc_np(errno)));
     }
     return {};

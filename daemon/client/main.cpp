@@ -1,7 +1,9 @@
 #include <clocale>
 
+#include "base/standard_streams.hpp"
 #include "commands.hpp"
 #include "manual/manual.hpp"
+#include "output.hpp"
 #include "version.hpp"
 
 namespace {
@@ -18,6 +20,7 @@ std::string one_line(const CLI::App* app, const CLI::Error& error) {
 // What nobody expects to be thrown ends the program with what it says.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
+    thermbal::keep_standard_streams();
     std::setlocale(LC_CTYPE, "");  // NOLINT(concurrency-mt-unsafe): before anything else runs
     CLI::App app("Asks a running thermbald over its socket, and does the same work offline on files.",
                  "thermbalctl");
@@ -40,7 +43,7 @@ int main(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : 2;
+        return app.exit(error) == 0 ? thermbal::print_text("") : 2;
     }
     return status;
 }

@@ -3,6 +3,7 @@
 #include "calibrate_command.hpp"
 #include "commands.hpp"
 #include "diagnose_command.hpp"
+#include "manual/flags.hpp"
 #include "simulate_command.hpp"
 
 namespace thermbal {
@@ -21,11 +22,11 @@ void add_simulate(CLI::App& app, int& status) {
     simulate_command
         .add_option("--duration-min", simulate->duration_min,
                     "until this time; without it, to the end of the inputs")
-        ->check(CLI::Range(0.0, 1e6));
+        ->check(number_in(0.0, 1e6));
     simulate_command
         .add_option("--every-s", simulate->every_s, "between samples where the inputs hold no readings")
         ->capture_default_str()
-        ->check(CLI::Range(0.01, 86400.0));
+        ->check(number_in(0.01, 86400.0));
     simulate_command
         .add_option("--csv", simulate->csv, "where the simulated test goes; - is standard output")
         ->required();

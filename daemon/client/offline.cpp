@@ -1,13 +1,16 @@
 #include "offline.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstdio>
 #include <set>
+#include <string_view>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "base/standard_streams.hpp"
 #include "compute/threads.hpp"
 #include "offline_input.hpp"
 #include "output.hpp"
@@ -31,9 +34,9 @@ json channels_json(const OfflineOptions& options, const std::vector<ChannelVerdi
     return list;
 }
 
-void print_table(const OfflineOptions& options, const std::vector<ChannelVerdict>& verdicts) {
-    fmt::print("{:<6} {:<14} {:>9} {:>4} {:>8} {:>9} {:>17} {:>9}  {}\n", "", "state", "declared", "n",
-               "RMSE", "settles", "90 % interval", "95 % at", "reason");
+std::string table_text(const OfflineOptions& options, const std::vector<ChannelVerdict>& verdicts) {
+    std::string text = fmt::format("{:<6} {:<14} {:>9} {:>4} {:>8} {:>9} {:>17} {:>9}  {}\n", "", "state",
+                                   "declared", "n", "RMSE", "settles", "90 % interval", "95 % at", "reason");
     const auto number = [](double value, const char* unit, int digits) {
         return std::isfinite(value) ? fmt::format("{:.{}f} {}", value, digits, unit) : std::string("-");
     };
@@ -43,11 +46,62 @@ void print_table(const OfflineOptions& options, const std::vector<ChannelVerdict
             std::isfinite(v.steady_state_low_C)
                 ? fmt::format("{:.2f} .. {:.2f} C", v.steady_state_low_C, v.steady_state_high_C)
                 : "-";
-        fmt::print("{:<6} {:<14} {:>9} {:>4} {:>8} {:>9} {:>17} {:>9}  {}\n", v.channel, to_string(v.state),
-                   number(v.declared_at_min, "min", 1), v.n > 0 ? std::to_string(v.n) : "-",
-                   number(v.window_rmse_C, "C", 3), number(v.steady_state_C, "C", 2), interval,
-                   number(v.equilibrium_time_min, "min", 0), v.reason);
+        text += fmt::format("{:<6} {:<14} {:>9} {:>4} {:>8} {:>9} {:>17} {:>9}  {}\n", v.channel,
+                            to_string(v.state), number(v.declared_at_min, "min", 1),
+                            v.n > 0 ? std::to_string(v.n) : "-", number(v.window_rmse_C, "C", 3),
+                            number(v.steady_state_C, "C", 2), interval,
+                            number(v.equilibrium_time_min, "min", 0), v.reason);
     }
+    return text;
+}
+
+/// What a recording leaves for the archive.
+struct Lesson {
+    ArchivedSpectrum spectrum;
+    double length_min = 0.0;
+};
+
+/// The guard that says of this channel that its end is not known yet; nullptr where it is, or where the
+/// sensor is broken. Of the newest samples and the room nothing is asked: they matter to a declaration, not
+/// to a lesson.
+const Guard* not_known_yet(const ChannelVerdict& verdict) {
+    constexpr std::array<std::string_view, 3> of_the_end{"interval_within_tolerance",
+                                                         "slowest_seen_long_enough", "most_of_the_rise_seen"};
+    const auto failed = std::ranges::find_if(verdict.guards, [&](const Guard& guard) {
+        return !guard.passed && std::ranges::find(of_the_end, guard.name) != of_the_end.end();
+    });
+    return failed == verdict.guards.end() ? nullptr : &*failed;
+}
+
+/// A recording teaches what it knows at its end: an unsettled one would teach a guess, and later tests would
+/// be declared on it.
+Result<Lesson> lesson_of(const std::string& file, const std::string& ambient) {
+    OfflineOptions options;
+    options.file = file;
+    options.ambient = ambient;
+    options.modes_only = true;
+    const auto input = read_input(options);
+    if (!input) return std::unexpected(input.error());
+    auto verdict =
+        LiveFlow(input->flow).identify(input->window, {}, parallel_on_threads(1, false), not_cancelled);
+    if (!verdict) return std::unexpected(verdict.error());
+    if (!verdict->spectrum) {
+        return fail(
+            NextStep::refuse_input,
+            fmt::format("{}: the machine's inputs change during the test, or it is too short; expected "
+                        "one regime, measured until it has settled",
+                        file));
+    }
+    for (const ChannelVerdict& channel : verdict->channels) {
+        const Guard* const unknown = not_known_yet(channel);
+        if (unknown == nullptr) continue;
+        return fail(
+            NextStep::refuse_input,
+            fmt::format("{}: ends at {:.0f} min, where {} is not known yet ({}); only a recording that has "
+                        "settled teaches. Measure on; thermbalctl identify says how far each channel is",
+                        file, verdict->window_end_min, channel.channel, unknown->figures));
+    }
+    return Lesson{std::move(*verdict->spectrum), verdict->window_end_min};
 }
 
 }  // namespace
@@ -55,7 +109,15 @@ void print_table(const OfflineOptions& options, const std::vector<ChannelVerdict
 int run_identify(const OfflineOptions& options) {
     auto input = read_input(options);
     if (!input) return report_error(input.error());
-    if (options.until_min) input->window = window_until(input->window, *options.until_min * 60.0);
+    if (options.until_min) {
+        const double first_min = input->window.start_s / 60.0;
+        if (*options.until_min < first_min) {
+            return report_error(
+                {NextStep::refuse_input, fmt::format("--until-min {}: {} begins at {:.2f} min",
+                                                     *options.until_min, options.file, first_min)});
+        }
+        input->window = window_until(input->window, *options.until_min * 60.0);
+    }
     if (!options.modes_only) input->flow.sweep_when = SweepWhen::always;
     std::set<std::string>
         unwanted;  // the others are estimated, the shared time constants need them, but not swept
@@ -70,46 +132,38 @@ int run_identify(const OfflineOptions& options) {
     progress.reset();
     if (!verdict) return report_error(verdict.error());
     if (options.json) {
-        fmt::print("{}\n", json{{"window_end_min", verdict->window_end_min},
-                                {"regime_since_min", verdict->regime_since_min},
-                                {"channels", channels_json(options, verdict->channels)}}
-                               .dump(2));
-    } else {
-        fmt::print("window: {:.2f} to {:.2f} min\n", verdict->regime_since_min, verdict->window_end_min);
-        print_table(options, verdict->channels);
+        return print_json({{"window_end_min", verdict->window_end_min},
+                           {"regime_since_min", verdict->regime_since_min},
+                           {"channels", channels_json(options, verdict->channels)}});
     }
-    return 0;
+    return print_text(
+        fmt::format("window: {:.2f} to {:.2f} min\n", verdict->regime_since_min, verdict->window_end_min) +
+        table_text(options, verdict->channels));
 }
 
 int run_learn(const LearnOptions& options) {
-    OfflineOptions one;
-    one.ambient = options.ambient;
+    std::vector<Lesson> lessons;
+    for (const std::string& file : options.files) {
+        auto lesson = lesson_of(file, options.ambient);
+        if (!lesson) return report_error(lesson.error());
+        lessons.push_back(std::move(*lesson));
+    }
     auto store = Store::open(options.archive, {options.now_wall_ns, 0});
     if (!store) return report_error(store.error());
-    for (const std::string& file : options.files) {
-        one.file = file;
-        const auto input = read_input(one);
-        if (!input) return report_error(input.error());
-        FlowOptions flow = input->flow;
-        flow.sweep_when = SweepWhen::never;
-        const auto verdict =
-            LiveFlow(flow).identify(input->window, {}, parallel_on_threads(1, false), not_cancelled);
-        if (!verdict) return report_error(verdict.error());
-        if (!verdict->spectrum) {
-            return report_error(
-                {NextStep::refuse_input,
-                 fmt::format("{}: the machine's inputs change during the test; expected one regime", file)});
-        }
-        const auto id = store->record_archive({.id = 0,
-                                               .machine = options.machine,
-                                               .test_id = {},
-                                               .created_wall_ns = options.now_wall_ns,
-                                               .spectrum_json = spectrum_to_json(*verdict->spectrum).dump()});
+    std::string text;
+    for (std::size_t i = 0; i < lessons.size(); ++i) {
+        const auto id =
+            store->record_archive({.id = 0,
+                                   .machine = options.machine,
+                                   .test_id = {},
+                                   .created_wall_ns = options.now_wall_ns,
+                                   .spectrum_json = spectrum_to_json(lessons[i].spectrum).dump()});
         if (!id) return report_error(id.error());
-        fmt::print("{}: {:.0f} min of {} are in {}\n", file, verdict->window_end_min,
-                   options.machine.empty() ? "a machine without name" : options.machine, options.archive);
+        text += fmt::format("{}: {:.0f} min of {} are in {}\n", options.files[i], lessons[i].length_min,
+                            options.machine.empty() ? "a machine without name" : options.machine,
+                            options.archive);
     }
-    return 0;
+    return print_text(text);
 }
 
 int run_replay(const OfflineOptions& options) {
@@ -118,8 +172,9 @@ int run_replay(const OfflineOptions& options) {
     std::optional<Progress> progress("replay");
     const auto tell = [&](const ReplayChange& one) {
         if (options.json) return;
-        fmt::print("{:7.2f} min  {} {}: {}\n", one.at_min, one.change.channel, to_string(one.change.kind),
-                   one.change.reason);
+        // Said as it happens; whether it was taken is asked at the end.
+        std::ignore = print_out(fmt::format("{:7.2f} min  {} {}: {}\n", one.at_min, one.change.channel,
+                                            to_string(one.change.kind), one.change.reason));
     };
     const auto done = replay(*input, options, tell, *progress);
     progress.reset();
@@ -132,22 +187,19 @@ int run_replay(const OfflineOptions& options) {
                                {"change", to_string(one.change.kind)},
                                {"reason", one.change.reason}});
         }
-        fmt::print("{}\n", json{{"test_stopped_at_min", number_or_null(done->stopped_at_min)},
-                                {"reason", done->decision.reason},
-                                {"archive_dropped", done->archive_dropped},
-                                {"changes", std::move(changes)},
-                                {"channels", channels_json(options, done->channels)}}
-                               .dump(2));
-        return 0;
+        return print_json({{"test_stopped_at_min", number_or_null(done->stopped_at_min)},
+                           {"reason", done->decision.reason},
+                           {"archive_dropped", done->archive_dropped},
+                           {"changes", std::move(changes)},
+                           {"channels", channels_json(options, done->channels)}});
     }
     const double end_min = input->window.end_s() / 60.0;
-    print_table(options, done->channels);
-    fmt::print("{}\n",
-               std::isfinite(done->stopped_at_min)
-                   ? fmt::format("test stopped at {:.2f} of {:.2f} min: {}", done->stopped_at_min, end_min,
-                                 done->decision.reason)
-                   : fmt::format("test not stopped in {:.2f} min: {}", end_min, done->decision.reason));
-    return 0;
+    const std::string ending =
+        std::isfinite(done->stopped_at_min)
+            ? fmt::format("test stopped at {:.2f} of {:.2f} min: {}\n", done->stopped_at_min, end_min,
+                          done->decision.reason)
+            : fmt::format("test not stopped in {:.2f} min: {}\n", end_min, done->decision.reason);
+    return print_text(table_text(options, done->channels) + ending);
 }
 
 }  // namespace thermbal

@@ -3,6 +3,7 @@
 
 #include "commands.hpp"
 #include "compare.hpp"
+#include "manual/flags.hpp"
 #include "offline.hpp"
 
 namespace thermbal {
@@ -21,7 +22,7 @@ void add_recording_flags(CLI::App& command, OfflineOptions& options) {
     command
         .add_option("--tolerance-C", options.tolerance_C, "half width of the 90 % interval that is asked for")
         ->capture_default_str()
-        ->check(CLI::Range(0.01, 10.0));
+        ->check(number_in(0.01, 10.0));
     command.add_option("--threads", options.threads, "compute threads")
         ->capture_default_str()
         ->check(CLI::Range(1, 256));
@@ -41,7 +42,8 @@ void add_offline_commands(CLI::App& app, int& status) {
     identify_command.group(group);
     add_recording_flags(identify_command, *identify);
     add_modes_only_flag(identify_command, *identify);
-    identify_command.add_option("--until-min", identify->until_min, "use only the samples up to this time");
+    identify_command.add_option("--until-min", identify->until_min, "use only the samples up to this time")
+        ->check(number_in(0.0, 1e9));
     identify_command.callback([&status, identify] { status = run_identify(*identify); });
 
     const auto replay = std::make_shared<OfflineOptions>();
@@ -53,7 +55,7 @@ void add_offline_commands(CLI::App& app, int& status) {
     replay_command
         .add_option("--every-min", replay->every_min, "minutes of samples between two identifications")
         ->capture_default_str()
-        ->check(CLI::Range(0.01, 1e6));
+        ->check(number_in(0.01, 1e6));
     replay_command.callback([&status, replay] { status = run_replay(*replay); });
 
     const auto compare = std::make_shared<CompareOptions>();
@@ -65,7 +67,7 @@ void add_offline_commands(CLI::App& app, int& status) {
     compare_command
         .add_option("--every-min", compare->recording.every_min, "minutes of samples between two windows")
         ->capture_default_str()
-        ->check(CLI::Range(0.01, 1e6));
+        ->check(number_in(0.01, 1e6));
     compare_command.add_option("--estimator", compare->estimators,
                                "only this one, several times for several: svr (slow), one_exponential, "
                                "two_exponentials, kalman, modes, modes_and_svr, modes_with_archive");

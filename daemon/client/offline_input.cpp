@@ -47,6 +47,13 @@ Result<OfflineInput> read_input(const OfflineOptions& options) {
         if (input.window.channel(channel) == nullptr) {
             return fail(NextStep::refuse_input, fmt::format("{}: no column {}", options.file, channel));
         }
+        if (channel == input.flow.ambient) {
+            return fail(
+                NextStep::refuse_input,
+                fmt::format("--channel {}: it measures the room, which is not identified; name another "
+                            "channel, or another --ambient",
+                            channel));
+        }
     }
     return input;
 }

@@ -1,6 +1,5 @@
 #include "output.hpp"
 
-#include <cstdio>
 #include <cstdlib>
 
 #include <fmt/format.h>
@@ -8,6 +7,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "base/standard_streams.hpp"
 #include "columns.hpp"
 
 namespace thermbal {
@@ -30,13 +30,13 @@ bool has_colours(std::string_view terminal) {
 }  // namespace
 
 int report_error(const Error& error) {
-    fmt::print(stderr, "thermbalctl: {}\n", printable(error.message));
+    print_error_line("thermbalctl: " + printable(error.message));
     return error.next == NextStep::refuse_input ? 2 : 1;
 }
 
 int print_text(std::string_view text) {
-    if (std::fwrite(text.data(), 1, text.size(), stdout) == text.size() && std::fflush(stdout) == 0) return 0;
-    return report_error({NextStep::stop, "standard output: cannot be written"});
+    const auto printed = print_out(text);
+    return printed ? 0 : report_error(printed.error());
 }
 
 int print_json(const json& document) {

@@ -8,6 +8,7 @@
 #include "commands.hpp"
 #include "config/load.hpp"
 #include "files.hpp"
+#include "manual/flags.hpp"
 #include "network_address.hpp"
 #include "output.hpp"
 #include "probe/report.hpp"
@@ -114,10 +115,10 @@ void add_common_flags(CLI::App& command, ProbeFlags& flags) {
         ->check(CLI::Range(0, 65535));
     command.add_option("--timeout-ms", flags.timeout_ms, "how long a unit may take for a reply")
         ->capture_default_str()
-        ->check(CLI::Range(5.0, 10'000.0));
+        ->check(number_in(5.0, 10'000.0));
     command.add_option("--limit-s", flags.limit_s, "how long the probe may take")
         ->capture_default_str()
-        ->check(CLI::Range(0.1, 3600.0));
+        ->check(number_in(0.1, 3600.0));
     command.add_option("--profiles", flags.profiles, "a further folder with module profiles");
     command.add_option("--write-profile", flags.profile_out,
                        "write the profile that was found into this file");

@@ -37,8 +37,12 @@ Result<Replay> replay(const OfflineInput& input, const OfflineOptions& options,
     Replay done;
     const double end_min = input.window.end_s() / 60.0;
     const double first_min = input.window.start_s / 60.0;
-    for (double until_min = first_min + options.every_min; until_min <= end_min + 1e-9;
-         until_min += options.every_min) {
+    double until_min = first_min;
+    for (bool more = true; more;) {
+        // The last scan ends a window, however long the steps are.
+        until_min += options.every_min;
+        more = until_min < end_min - 1e-9;
+        until_min = std::min(until_min, end_min);
         // The work of a window grows with its length, so all windows up to here go with its square.
         progress.set(std::pow((until_min - first_min) / (end_min - first_min), 2.0));
         const TestWindow window = window_until(input.window, until_min * 60.0);

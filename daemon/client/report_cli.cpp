@@ -1,6 +1,7 @@
 #include <memory>
 
 #include "commands.hpp"
+#include "manual/flags.hpp"
 #include "report_command.hpp"
 
 namespace thermbal {
@@ -29,12 +30,12 @@ void add_report_command(CLI::App& app, int& status) {
         .add_option("--tolerance-C", options->recording.tolerance_C,
                     "of a file: half width of the 90 % interval asked for")
         ->capture_default_str()
-        ->check(CLI::Range(0.01, 10.0));
+        ->check(number_in(0.01, 10.0));
     command
         .add_option("--every-min", options->recording.every_min,
                     "of a file: minutes of samples between two identifications")
         ->capture_default_str()
-        ->check(CLI::Range(0.01, 1e6));
+        ->check(number_in(0.01, 1e6));
     command.add_flag("--modes-only", options->recording.modes_only,
                      "of a file: the shared modes alone, without the SVR criterion (a study)");
     command.add_option("--threads", options->recording.threads, "compute threads")

@@ -11,6 +11,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "base/standard_streams.hpp"
 #include "config/load.hpp"
 #include "manual/manual.hpp"
 #include "publish/secrets.hpp"
@@ -42,7 +43,7 @@ std::string host_name() {
 }
 
 int refused(const Error& error) {
-    fmt::print(stderr, "thermbal-mqtt: {}\n", error.message);
+    print_error_line("thermbal-mqtt: " + error.message);
     return error.next == NextStep::refuse_input ? 2 : 1;
 }
 
@@ -99,6 +100,7 @@ int run(Publisher& publisher, bool once) {
 // What nobody expects to be thrown ends the program with what it says.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
+    keep_standard_streams();
     CLI::App app("Sends what thermbald stores to an MQTT broker: samples, declarations, events, the state.",
                  "thermbal-mqtt");
     Flags flags;

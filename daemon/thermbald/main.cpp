@@ -14,8 +14,10 @@
 #include <unistd.h>
 
 #include "abort_test.hpp"
+#include "base/standard_streams.hpp"
 #include "config/load.hpp"
 #include "daemon.hpp"
+#include "manual/flags.hpp"
 #include "manual/manual.hpp"
 #include "model_watch.hpp"
 #include "version.hpp"
@@ -97,8 +99,13 @@ Result<void> check_stop_command(const Config& config, const std::string& file) {
 }
 
 int refused(const Error& error) {
-    fmt::print(stderr, "{}\n", error.message);
+    print_error_line(error.message);
     return error.next == NextStep::refuse_input ? 2 : 1;
+}
+
+int answered(const std::string& text) {
+    const auto printed = print_out(text);
+    return printed ? 0 : refused(printed.error());
 }
 
 }  // namespace
@@ -106,6 +113,7 @@ int refused(const Error& error) {
 // What nobody expects to be thrown ends the program with what it says.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
+    keep_standard_streams();
     CLI::App app(
         "Polls a temperature module during a thermal-balance test, declares where each channel will settle, "
         "and stops "
@@ -130,7 +138,7 @@ int main(int argc, char** argv) {
                  "end when a test has ended (demonstrations, tests)");
     CLI::Option_group& time = *app.add_option_group("time", "Faster than time, with a simulated module:");
     auto* scale = time.add_option("--time-scale", flags.time_scale, "run the clock so many times as fast")
-                      ->check(CLI::Range(0.01, 100000.0));
+                      ->check(number_in(0.01, 100000.0));
     time.add_option("--time-epoch-ns", flags.time_epoch_ns, "CLOCK_MONOTONIC at which the scaled time is 0")
         ->needs(scale);
     time.add_flag("--lockstep", flags.lockstep, "the next scan is due when the work of the last one is done")
@@ -143,7 +151,7 @@ int main(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? 0 : 2;
+        return app.exit(error) == 0 ? answered("") : 2;
     }
     flags.check = check->count() > 0;
     if (!checked_file.empty()) flags.config = checked_file;
@@ -160,17 +168,13 @@ int main(int argc, char** argv) {
         if (!model) return refused(model.error());
     }
     if (const auto runs = check_stop_command(*config, flags.config); !runs) return refused(runs.error());
-    if (flags.check) {
-        fmt::print("{}", explain_config(*config));
-        return 0;
-    }
+    if (flags.check) return answered(explain_config(*config));
 
     if (flags.abort_test) {
         const auto clock = system_clock();
         const auto done = abort_open_test(config->store.path, {clock->wall_ns(), clock->monotonic_ns()});
         if (!done) return refused(done.error());
-        fmt::print("{}\n", *done);
-        return 0;
+        return answered(*done + "\n");
     }
 
     spdlog::set_default_logger(spdlog::stderr_logger_mt("thermbald"));

@@ -114,10 +114,11 @@ void Daemon::prepare_flow(const std::string& machine) {
     test_.flow = std::move(flow);
 }
 
-/// What this test has taught about the machine, for the next one. A short test taught too little.
+/// What this test has taught about the machine, for the next one: what it knew, so nothing where it ended
+/// before every required channel was declared, or all but those whose sensors are broken.
 void Daemon::archive_test() {
-    constexpr double least_window_min = 60.0;
-    if (!test_.spectrum || test_.spectrum_window_min < least_window_min) return;
+    const bool knew_its_end = test_.decision.stop || test_.decision.held;
+    if (!test_.spectrum || test_.state != TestState::stopped || !knew_its_end) return;
     const ArchiveRecord record{.id = 0,
                                .machine = test_.machine,
                                .test_id = test_.id,

@@ -2,12 +2,14 @@
 #include <cstdio>
 #include <memory>
 #include <system_error>
+#include <tuple>
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
 #include <sys/signalfd.h>
 
+#include "base/standard_streams.hpp"
 #include "options.hpp"
 #include "replay/recorded_scans.hpp"
 #include "reports.hpp"
@@ -35,8 +37,7 @@ Result<File> open_file(const std::string& path, const char* mode) {
 Result<void> print_truth(const SimulatorOptions& options) {
     const Result<Truth> truth = plant_truth(spindle_head(), options.room.mean_C, options.drive);
     if (!truth) return std::unexpected(truth.error());
-    fmt::print("{}", options.json ? truth_json(options, *truth) : truth_table(options, *truth));
-    return {};
+    return print_out(options.json ? truth_json(options, *truth) : truth_table(options, *truth));
 }
 
 Result<void> write_recording(const SimulatorOptions& options) {
@@ -44,8 +45,9 @@ Result<void> write_recording(const SimulatorOptions& options) {
                                              options.noise, 15.0, options.duration_s);
     Result<File> file = open_file(options.csv_path, "wb");
     if (!file) return std::unexpected(file.error());
-    fmt::print(file->get(), "{}{}", recording_comments(options), format_recorded_test(test));
-    if (std::fflush(file->get()) == 0 && std::ferror(file->get()) == 0) return {};
+    const std::string text = recording_comments(options) + format_recorded_test(test);
+    if (std::fwrite(text.data(), 1, text.size(), file->get()) == text.size() && std::fflush(file->get()) == 0)
+        return {};
     return fail(NextStep::stop, fmt::format("{}: writing failed ({})", options.csv_path,
                                             std::generic_category().message(errno)));
 }
@@ -78,21 +80,23 @@ Result<std::function<void(const AnsweredRead&)>> truth_log(const std::string& pa
     if (!opened) return std::unexpected(opened.error());
     const std::shared_ptr<std::FILE> file = std::move(*opened);
     std::fseek(file.get(), 0, SEEK_END);
-    if (std::ftell(file.get()) == 0) fmt::print(file.get(), "time_s,unit,function,address,fault,words\n");
+    if (std::ftell(file.get()) == 0) std::fputs("time_s,unit,function,address,fault,words\n", file.get());
     std::fflush(file.get());
     return [file](const AnsweredRead& read) {
-        fmt::print(file.get(), "{:.6f},{},{},{},{},{}\n", read.time_s, read.unit, read.function, read.address,
-                   read.fault, hexadecimal(read.words));
+        const std::string line = fmt::format("{:.6f},{},{},{},{},{}\n", read.time_s, read.unit, read.function,
+                                             read.address, read.fault, hexadecimal(read.words));
+        std::fputs(line.c_str(), file.get());
         std::fflush(file.get());
     };
 }
 
 void print_write(double time_s, std::uint8_t unit, const ModuleWrite& write) {
     for (std::size_t i = 0; i < write.values.size(); ++i) {
-        fmt::print("wrote unit {} {} {} = {} at {:.3f} s\n", unit, write.coils ? "coil" : "holding register",
-                   write.address + i, write.values[i], time_s);
+        // The module goes on when nobody takes what it says.
+        std::ignore = print_out(fmt::format("wrote unit {} {} {} = {} at {:.3f} s\n", unit,
+                                            write.coils ? "coil" : "holding register", write.address + i,
+                                            write.values[i], time_s));
     }
-    std::fflush(stdout);
 }
 
 Result<Station> station(const SimulatorOptions& options) {
@@ -110,22 +114,24 @@ Result<Station> station(const SimulatorOptions& options) {
                    options.noise.seed);
 }
 
-void announce(std::string_view event, const std::string& what) {
-    fmt::print("{} {}\n", event, what);
-    std::fflush(stdout);
+Result<void> announce(std::string_view event, const std::string& what) {
+    return print_out(fmt::format("{} {}\n", event, what));
 }
 
 Result<void> open_endpoint(Server& server, const SimulatorOptions& options) {
     if (options.task == SimulatorTask::serve_tcp) {
         Result<TcpEndpoint> tcp = listen_on_loopback(options.port);
         if (!tcp) return std::unexpected(tcp.error());
-        announce("ready", fmt::format("tcp {}", fmt::join(tcp->addresses, " ")));
+        if (auto told = announce("ready", fmt::format("tcp {}", fmt::join(tcp->addresses, " "))); !told)
+            return told;
         server.listen(std::move(*tcp));
         return {};
     }
-    return server.attach([link_path = options.link_path, first = true]() mutable {
+    return server.attach([link_path = options.link_path, first = true]() mutable -> Result<PtyLine> {
         Result<PtyLine> line = open_pty_line(link_path);
-        if (line) announce(first ? "ready" : "plugged", fmt::format("rtu {}", line->port.path));
+        if (!line) return line;
+        const auto told = announce(first ? "ready" : "plugged", fmt::format("rtu {}", line->port.path));
+        if (!told && first) return std::unexpected(told.error());
         first = false;
         return line;
     });
@@ -170,8 +176,7 @@ Result<void> run(const SimulatorOptions& options) {
         case SimulatorTask::print_truth:
             return print_truth(options);
         case SimulatorTask::print_plant:
-            fmt::print("{}", plant_json(options, spindle_head()));
-            return {};
+            return print_out(plant_json(options, spindle_head()));
         case SimulatorTask::write_csv:
             return write_recording(options);
         case SimulatorTask::serve_tcp:
@@ -188,10 +193,11 @@ Result<void> run(const SimulatorOptions& options) {
 // What nobody expects to be thrown ends the program with what it says.
 // NOLINTNEXTLINE(bugprone-exception-escape)
 int main(int argc, char** argv) {
+    thermbal::keep_standard_streams();
     const thermbal::ParsedCommandLine command = thermbal::parse_command_line(argc, argv);
     if (!command.options) return command.exit_status;
     const thermbal::Result<void> done = thermbal::run(*command.options);
     if (done) return 0;
-    fmt::print(stderr, "thermbal-sim: {}\n", done.error().message);
+    thermbal::print_error_line("thermbal-sim: " + done.error().message);
     return done.error().next == thermbal::NextStep::refuse_input ? 2 : 1;
 }

@@ -10,6 +10,8 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "base/standard_streams.hpp"
+#include "manual/flags.hpp"
 #include "manual/manual.hpp"
 #include "simulator/scenario.hpp"
 #include "simulator/spindle_head.hpp"
@@ -80,35 +82,35 @@ void add_source_flags(CLI::App& app, Flags& flags) {
         ->capture_default_str()
         ->group("Source");
     app.add_option("--rpm", flags.rpm, "Spindle speed instead of the condition's, r/min")
-        ->check(CLI::Range(0.0, 20000.0))
+        ->check(number_in(0.0, 20000.0))
         ->group("Source");
     app.add_flag("--cutting", flags.cutting, "Cut, whatever the condition says")->group("Source");
     app.add_option("--room-C", flags.room.mean_C, "The room, C")
-        ->check(CLI::Range(-20.0, 60.0))
+        ->check(number_in(-20.0, 60.0))
         ->capture_default_str()
         ->group("Source");
     app.add_option("--room-drift-C-per-h", flags.room.drift_C_per_h, "How fast the room warms, C/h")
-        ->check(CLI::Range(-20.0, 20.0))
+        ->check(number_in(-20.0, 20.0))
         ->group("Source");
     app.add_option("--room-cycle-C", flags.room.cycle_amplitude_C, "Amplitude of a sine on the room, C")
-        ->check(CLI::Range(0.0, 20.0))
+        ->check(number_in(0.0, 20.0))
         ->group("Source");
     app.add_option("--room-cycle-period-min", flags.room_cycle_period_min, "Its period, min")
-        ->check(CLI::Range(0.1, 10000.0))
+        ->check(number_in(0.1, 10000.0))
         ->capture_default_str()
         ->group("Source");
     app.add_option("--seed", flags.noise.seed, "Seed of the noise")->capture_default_str()->group("Source");
     app.add_option("--noise-C", flags.noise.noise_C, "Standard deviation of the sensors' noise, C")
-        ->check(CLI::Range(0.0, 10.0))
+        ->check(number_in(0.0, 10.0))
         ->capture_default_str()
         ->group("Source");
     app.add_option("--round-C", flags.noise.round_C, "Resolution of the module, C; 0: none")
-        ->check(CLI::Range(0.0, 10.0))
+        ->check(number_in(0.0, 10.0))
         ->capture_default_str()
         ->group("Source");
     app.add_option("--spindle-start-s", flags.spindle_start_s,
                    "Simulated time at which the spindle starts, s")
-        ->check(CLI::Range(0.0, 1e9))
+        ->check(number_in(0.0, 1e9))
         ->group("Source");
     app.add_option("--replay", flags.replay_path, "A recorded test in CSV instead of the plant")
         ->group("Source");
@@ -161,7 +163,7 @@ void add_fault_flags(CLI::App& app, Flags& flags) {
 
 void add_time_flags(CLI::App& app, Flags& flags) {
     CLI::Option* scale = app.add_option("--time-scale", flags.time_scale, "Simulated seconds a real second")
-                             ->check(CLI::Range(1e-3, 1e6))
+                             ->check(number_in(1e-3, 1e6))
                              ->capture_default_str()
                              ->group("Time");
     CLI::Option* epoch =
@@ -170,7 +172,7 @@ void add_time_flags(CLI::App& app, Flags& flags) {
             ->group("Time");
     app.add_option("--lockstep", flags.lockstep_s,
                    "No clock: every read of the first unit's first register moves time on by so many s")
-        ->check(CLI::Range(1e-3, 1e6))
+        ->check(number_in(1e-3, 1e6))
         ->excludes(scale)
         ->excludes(epoch)
         ->group("Time");
@@ -185,7 +187,7 @@ void add_offline_flags(CLI::App& app, Flags& flags) {
     app.add_option("--csv", flags.csv_path, "Write a recorded test of the plant, a row each 15 s; no server")
         ->group("Without a server");
     app.add_option("--duration-min", flags.duration_min, "Its length, min")
-        ->check(CLI::Range(0.25, 1e5))
+        ->check(number_in(0.25, 1e5))
         ->capture_default_str()
         ->group("Without a server");
 }
@@ -310,6 +312,14 @@ Result<SimulatorOptions> checked(const Flags& flags) {
     return options;
 }
 
+/// What --help and --version printed may have met a full disk.
+int answered(int status) {
+    const auto printed = print_out("");
+    if (printed) return status;
+    print_error_line("thermbal-sim: " + printed.error().message);
+    return 1;
+}
+
 }  // namespace
 
 Result<std::vector<ModuleUnit>> parse_units(const std::string& text, int first_id,
@@ -365,13 +375,13 @@ ParsedCommandLine parse_command_line(int argc, char** argv) {
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        if (error.get_exit_code() == 0) return {.options = {}, .exit_status = app.exit(error)};
-        fmt::print(stderr, "thermbal-sim: {}; see --help\n", error.what());
+        if (error.get_exit_code() == 0) return {.options = {}, .exit_status = answered(app.exit(error))};
+        print_error_line(fmt::format("thermbal-sim: {}; see --help", error.what()));
         return {.options = {}, .exit_status = 2};
     }
     auto options = checked(flags);
     if (!options) {
-        fmt::print(stderr, "thermbal-sim: {}\n", options.error().message);
+        print_error_line("thermbal-sim: " + options.error().message);
         return {.options = {}, .exit_status = 2};
     }
     return {.options = std::move(*options), .exit_status = 0};

@@ -53,6 +53,18 @@ TEST(Csv, AnInputMayHaveAnyName) {
     EXPECT_EQ(again->inputs[0].values, test.inputs[0].values);
 }
 
+TEST(Csv, OnlyTemperaturesAreBounded) {
+    const auto test =
+        parse_recorded_test("time_s,T1,offset\n0,-273.15,-9999\n15,3000,1e308\n30,,\n", "inputs.csv");
+    ASSERT_TRUE(test) << test.error().message;
+    EXPECT_EQ(test->inputs[0].values[0], -9999.0);
+}
+
+TEST(Csv, AGapOfAWeekendAndAWeekAtASecondAreTaken) {
+    EXPECT_TRUE(parse_recorded_test("time_s,T1\n0,1\n15,1\n30,1\n223230,1\n", "weekend.csv"));
+    EXPECT_TRUE(parse_recorded_test("time_s,T1\n0,1\n1,1\n2,1\n604800,1\n", "week.csv"));
+}
+
 struct Refused {
     const char* text;
     const char* message;
@@ -69,16 +81,24 @@ TEST_P(CsvRefused, SaysFileLineColumnAndWhatWasFound) {
 
 INSTANTIATE_TEST_SUITE_P(
     Csv, CsvRefused,
-    testing::Values(Refused{"", "bad.csv:1:1: no header"}, Refused{"t,T1\n0,1\n", "first column is 't'"},
-                    Refused{"time_s,T1\n", "no row follows"},
-                    Refused{"time_s,T1,T1\n0,1,2\n", "'T1' stands twice"},
-                    Refused{"time_s,T1\n0,1\n0,2\n", "bad.csv:3:1: time_s is 0 after 0"},
-                    Refused{"time_s,T1\n0,1\n15,abc\n", "bad.csv:3:4: T1 is 'abc'"},
-                    Refused{"time_s,T1\n0,1,2\n", "3 cells, the header has 2"},
-                    Refused{"time_s,T1\n0,inf\n", "T1 is 'inf'"}, Refused{"time_s,T1\n\"0,1\n", "not closed"},
-                    Refused{"time_s,\"T1\"x,T2\n0,1,2\n", "text follows its closing quote"},
-                    Refused{"time_s,\n0,1\n", "a column has no name"},
-                    Refused{"time_s,T1\n,1\n", "time_s is ''"}));
+    testing::Values(
+        Refused{"", "bad.csv:1:1: no header"}, Refused{"t,T1\n0,1\n", "first column is 't'"},
+        Refused{"time_s,T1\n", "no row follows"}, Refused{"time_s,T1,T1\n0,1,2\n", "'T1' stands twice"},
+        Refused{"time_s,T1\n0,1\n0,2\n", "bad.csv:3:1: time_s is 0 after 0"},
+        Refused{"time_s,T1\n0,1\n15,abc\n", "bad.csv:3:4: T1 is 'abc'"},
+        Refused{"time_s,T1\n0,1,2\n", "3 cells, the header has 2"},
+        Refused{"time_s,T1\n0,inf\n", "T1 is 'inf'"}, Refused{"time_s,T1\n\"0,1\n", "not closed"},
+        Refused{"time_s,\"T1\"x,T2\n0,1,2\n", "text follows its closing quote"},
+        Refused{"time_s,T1\n0,1\n15,1\n30,1\n1e9,1\n",
+                "bad.csv:5:1: time_s is 1000000000 after 30; with a row each 15 s"},
+        Refused{"time_s,T1\n0,1\n15,1\n30,1\n1e300,1\n", "bad.csv:5:1: time_s is 1e+300 after 30"},
+        Refused{"time_s,T1\n-1e12,1\n0,1\n15,1\n30,1\n", "bad.csv:3:1: time_s is 0 after -1000000000000"},
+        Refused{"time_s,T1\n-1.7e308,1\n0,1\n1.7e308,1\n", "Mend the time, or split the file here"},
+        Refused{"time_s,T1,T2\n0,18,18\n15,18,-9999\n",
+                "bad.csv:3:7: T2 is -9999 C, which is no temperature (-273.15 to 3000 C); leave the "
+                "cell empty"},
+        Refused{"time_s,T1\n0,1e308\n", "bad.csv:2:3: T1 is 1e308 C"},
+        Refused{"time_s,\n0,1\n", "a column has no name"}, Refused{"time_s,T1\n,1\n", "time_s is ''"}));
 
 }  // namespace
 }  // namespace thermbal

@@ -44,6 +44,10 @@ TEST(Window, UntilAndFromKeepTheScanAtTheLimit) {
     }
     EXPECT_EQ(window_until(window, -1.0).scans, 0U);
     EXPECT_EQ(window_from(window, 1e9).scans, 0U);
+    EXPECT_EQ(window_until(window, 1e300).scans, 100U);
+    EXPECT_EQ(window_from(window, -1e300).scans, 100U);
+    EXPECT_EQ(window_until(window, no_value).scans, 0U);
+    EXPECT_EQ(window_from(window, no_value).scans, 0U);
 }
 
 TEST(Window, CoarsenedHoldsMeansOfGoodNeighboursAtTheirMiddle) {

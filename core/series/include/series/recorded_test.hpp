@@ -25,7 +25,9 @@ struct RecordedTest {
 
 /// Reads the CSV form of INTERFACES: RFC 4180 with header, first column `time_s`, a channel is `T` and a
 /// number, any other column a known input, `#` lines before the header are comments, an empty cell is a
-/// missing sample. `name` stands in the messages (file name). Errors (refuse_input) carry line and column.
+/// missing sample. `name` stands in the messages (file name). Errors (refuse_input) carry line and column;
+/// times that stretch the grid of to_window over more than a million scans, and twice the rows, are one of
+/// them.
 Result<RecordedTest> parse_recorded_test(std::string_view csv_text, std::string_view name);
 
 /// Whether a known input may be called so: letters, digits and '_', no channel's name, not "time_s".
@@ -46,7 +48,7 @@ struct TestWindow {
 
     double time_s(std::size_t scan) const { return start_s + static_cast<double>(scan) * period_s; }
     double end_s() const { return scans == 0 ? start_s : time_s(scans - 1); }
-    /// How many of the first scans are at times <= until_s.
+    /// How many of the first scans are at times <= until_s; none where that is NaN.
     std::size_t scans_until(double until_s) const;
     const Column* channel(std::string_view channel_name) const;
     const Column* input(std::string_view input_name) const;
@@ -65,7 +67,7 @@ RecordedTest recording_of(const TestWindow& window);
 /// The first scans of a window: those at times <= until_s.
 TestWindow window_until(const TestWindow& window, double until_s);
 
-/// The scans of a window at times >= from_s.
+/// The scans of a window at times >= from_s; none where that is NaN.
 TestWindow window_from(const TestWindow& window, double from_s);
 
 /// At most `most_scans` scans, each the mean of the good samples of k neighbours at the middle of their
