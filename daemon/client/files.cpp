@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "base/standard_streams.hpp"
 #include "config/load.hpp"
+#include "manual/standard_streams.hpp"
 
 namespace thermbal {
 namespace {

@@ -1,8 +1,8 @@
 #include <clocale>
 
-#include "base/standard_streams.hpp"
 #include "commands.hpp"
 #include "manual/manual.hpp"
+#include "manual/standard_streams.hpp"
 #include "output.hpp"
 #include "version.hpp"
 

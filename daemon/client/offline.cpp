@@ -10,8 +10,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "base/standard_streams.hpp"
 #include "compute/threads.hpp"
+#include "manual/standard_streams.hpp"
 #include "offline_input.hpp"
 #include "output.hpp"
 #include "progress.hpp"

@@ -7,8 +7,8 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include "base/standard_streams.hpp"
 #include "columns.hpp"
+#include "manual/standard_streams.hpp"
 
 namespace thermbal {
 namespace {

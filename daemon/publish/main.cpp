@@ -11,9 +11,9 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include "base/standard_streams.hpp"
 #include "config/load.hpp"
 #include "manual/manual.hpp"
+#include "manual/standard_streams.hpp"
 #include "publish/secrets.hpp"
 #include "publisher.hpp"
 #include "version.hpp"

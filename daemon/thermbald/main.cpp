@@ -14,11 +14,11 @@
 #include <unistd.h>
 
 #include "abort_test.hpp"
-#include "base/standard_streams.hpp"
 #include "config/load.hpp"
 #include "daemon.hpp"
 #include "manual/flags.hpp"
 #include "manual/manual.hpp"
+#include "manual/standard_streams.hpp"
 #include "model_watch.hpp"
 #include "version.hpp"
 

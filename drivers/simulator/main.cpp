@@ -9,7 +9,7 @@
 #include <signal.h>
 #include <sys/signalfd.h>
 
-#include "base/standard_streams.hpp"
+#include "manual/standard_streams.hpp"
 #include "options.hpp"
 #include "replay/recorded_scans.hpp"
 #include "reports.hpp"

@@ -10,9 +10,9 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "base/standard_streams.hpp"
 #include "manual/flags.hpp"
 #include "manual/manual.hpp"
+#include "manual/standard_streams.hpp"
 #include "simulator/scenario.hpp"
 #include "simulator/spindle_head.hpp"
 
