@@ -26,9 +26,10 @@ struct FreezeChange {
 };
 
 /// Notices a module that answers and measures no more: every word of all its channels the same as the scan
-/// before, for longer than chance allows. How likely a scan without any change is, is learnt from the
-/// module's last 200 scans; frozen is what would be seen by chance once in 10^9 scans, or frozen_after_scans.
-/// A module that never changed yet is not judged by chance. Event loop only.
+/// before, for longer than a live module would show it even while its temperatures settle: chance once in
+/// 10^9, for the module as a whole and for its channels together (README), or frozen_after_scans. What is
+/// likely is learnt from the newest scans. A module that never changed yet is not judged by chance. Event
+/// loop only.
 class FreezeWatch {
   public:
     explicit FreezeWatch(std::vector<WatchedModule> modules);
@@ -43,18 +44,43 @@ class FreezeWatch {
     const WatchedModule& module(std::size_t index) const { return states_[index].module; }
 
   private:
+    /// How often something is seen: counts in which older scans fade.
+    struct Share {
+        double scans = 0.0;
+        double seen = 0.0;
+
+        void add(double unseen_scans, bool seen_at_last, double memory_scans);
+        /// -ln of the chance that it is not seen in a scan.
+        double surprise() const;
+    };
+    /// In the newest scans, and in some more.
+    struct Frequency {
+        Share newest;
+        Share lately;
+
+        void add(double unseen_scans, bool seen_at_last);
+    };
+    struct Channel {
+        std::optional<std::uint32_t> word;    ///< the newest one
+        std::optional<std::uint32_t> former;  ///< the last other one before it
+        bool changed = false;                 ///< at this scan
+        bool third = false;                   ///< ... to another word than the former one
+        Frequency changes;
+        Frequency third_words;
+    };
     struct State {
         WatchedModule module;
-        std::vector<std::optional<std::uint32_t>> words;  ///< newest ones, by position in module.channels
-        double scans = 0.0;                               ///< compared lately
-        double unchanged = 0.0;                           ///< of these
-        std::int64_t run = 0;                             ///< unchanged scans in a row
+        std::vector<Channel> channels;  ///< by position in module.channels
+        Share changes;                  ///< of any channel
+        std::int64_t run = 0;           ///< unchanged scans in a row
         std::int64_t run_first_scan = 0;
+        bool one_step = false;  ///< this scan's change is one step of one channel
         bool frozen = false;
     };
     enum class Seen : std::uint8_t { nothing, a_change, the_same };
 
     static Seen compare(State& state, const Scan& scan);
+    static double surprise_of_channels(const State& state, Share Frequency::* memory);
     static bool too_long_for_chance(const State& state);
     static std::optional<FreezeChange> judge(State& state, Seen seen, std::int64_t scan);
 
