@@ -13,6 +13,7 @@
 #include "fields.hpp"
 #include "files.hpp"
 #include "output.hpp"
+#include "samples.hpp"
 #include "socket_client.hpp"
 
 namespace thermbal {
@@ -63,23 +64,6 @@ std::string test_text(const json& answer) {
     const std::string model = text(answer, "model");
     return fmt::format("test {} is {}{}\n", fixed(number(answer, "test"), 0), text(answer, "state"),
                        model.empty() ? "" : fmt::format(", compared with model \"{}\"", printable(model)));
-}
-
-/// One answer holds only so many samples: asks for the scans behind it until there are `limit` or no more.
-Result<json> with_further_scans(SocketClient& client, json params, json samples) {
-    std::size_t wanted = params["limit"].get<std::size_t>();
-    std::size_t got = list(samples, "scans").size();
-    while (got > 0 && got < wanted) {
-        const double last = number(list(samples, "scans").back(), "scan").value_or(0.0);
-        wanted -= got;
-        params["limit"] = wanted;
-        params["from_scan"] = static_cast<std::int64_t>(last) + 1;
-        auto next = client.ask("samples", params);
-        if (!next) return next;
-        got = list(*next, "scans").size();
-        for (const json& scan : list(*next, "scans")) samples["scans"].push_back(scan);
-    }
-    return samples;
 }
 
 std::int64_t newest_id(const json& events, std::int64_t otherwise) {
@@ -175,12 +159,20 @@ int run_annotate(const AskOptions& ask, const std::string& message, const std::s
 int run_samples(const AskOptions& ask, const SamplesOptions& options) {
     auto client = SocketClient::connect(ask.socket);
     if (!client) return report_run_time(client.error());
-    json params = without_empty({{"channel", options.channel}, {"limit", options.limit}});
+    json params = without_empty({{"channel", options.channel}});
     if (options.from_scan) params["from_scan"] = *options.from_scan;
-    auto samples = client->ask("samples", params);
-    if (samples) samples = with_further_scans(*client, params, std::move(*samples));
-    if (!samples) return report_run_time(samples.error());
-    return ask.json ? print_json(*samples) : print_text(samples_text(*samples));
+    json samples;
+    const auto asked =
+        ask_samples([&](const json& page) { return client->ask("samples", page); }, params, options.limit,
+                    [&](json answer) {
+                        if (samples.is_null()) {
+                            samples = std::move(answer);
+                            return;
+                        }
+                        for (json& scan : answer["scans"]) samples["scans"].push_back(std::move(scan));
+                    });
+    if (!asked) return report_run_time(asked.error());
+    return ask.json ? print_json(samples) : print_text(samples_text(samples));
 }
 
 int run_curve(const AskOptions& ask, const std::string& channel) {

@@ -136,6 +136,7 @@ void Daemon::begin_window(double period_s) {
         test_.window.channels.push_back({channel.name, {}});
     newest_good_C_.assign(options_.config.channels.size(), no_value);
     alarm_watch_.emplace(alarm_limits(options_.config), options_.config.channels.size());
+    time_watch_ = TimeWatch();
 }
 
 /// The test that was open when the daemon ended, if there was one, with the scans that are stored. After an

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include <poll.h>
 
@@ -9,6 +10,7 @@
 #include "report/page.hpp"
 #include "report/plot.hpp"
 #include "report/verdict_json.hpp"
+#include "samples.hpp"
 #include "series/sample.hpp"
 
 namespace thermbal {
@@ -66,21 +68,23 @@ void LiveState::take_scan(const json& channels) {
 
 /// The course of the test from its first scan on, out of the daemon's store.
 void LiveState::refill() {
-    constexpr std::int64_t scans_a_page = 2000;
     const auto id = number(object_in(feed_.scene().status, "test"), "id");
     std::vector<std::string> names;
     for (const json& channel : list(feed_.scene().channels, "channels"))
         names.push_back(text(channel, "channel"));
     std::vector<double> time_min;
     std::vector<std::vector<double>> columns(names.size());
-    for (std::int64_t from = 0; id; from += scans_a_page) {
-        const auto page = feed_.ask("samples", {{"from_scan", from}, {"limit", scans_a_page}});
-        if (!page || list(*page, "scans").empty()) break;
-        for (const json& scan : list(*page, "scans")) {
+    const auto take_page = [&](const json& page) {
+        for (const json& scan : list(page, "scans")) {
             time_min.push_back(number(scan, "time_s").value_or(no_value) / 60.0);
             for (std::size_t i = 0; i < names.size(); ++i)
                 columns[i].push_back(good_value_C(object_in(object_in(scan, "samples"), names[i].c_str())));
         }
+    };
+    // Whoever breaks off is away: what came is shown until it is back.
+    if (id) {
+        (void)ask_samples([&](const json& params) { return feed_.ask("samples", params); },
+                          {{"from_scan", 0}}, std::numeric_limits<std::int64_t>::max(), take_page);
     }
     predictions_ = json::array();
     if (auto answer = feed_.ask("predictions")) predictions_ = list(*answer, "channels");

@@ -17,7 +17,7 @@ struct TimeEvent {
 };
 
 /// Compares what the clocks did since the scan before, and whether the scans come when they are due. The grid
-/// needs none of this: it runs on boot_ns. Pure; one thread.
+/// needs none of this: it runs on boot_ns. One for each test. Pure; one thread.
 class TimeWatch {
   public:
     /// Once a scan, and at least as often as somebody wants to know of a suspend.
@@ -25,9 +25,6 @@ class TimeWatch {
 
     /// One event when scans begin to be late or missed, one when they are on time again: not one a scan.
     std::optional<TimeEvent> take_scan(const Scan& scan);
-
-    /// The clocks' next reading is not compared with the one before: another grid, another test.
-    void forget() { last_.reset(); }
 
   private:
     std::optional<ClockReading> last_;
