@@ -36,6 +36,7 @@ class DistanceColumns {
 
     void first(std::size_t rows, double* distance) const {
         std::vector<const double*> lags;
+        lags.reserve(problem_.lags);
         for (std::size_t lag = 0; lag < problem_.lags; ++lag) lags.push_back(lagged(lag));
         vector_loops::squared_distances_to(lags.data(), rows, problem_.input(0).data(), problem_.lags,
                                            distance);
