@@ -50,21 +50,18 @@ std::string explain_serial(const LineConfig& line) {
     } else {
         text += fmt::format("device = {}\n", toml_quoted(line.link.device));
     }
-    const std::string_view parity = line.link.parity == 'N'   ? "none"
-                                    : line.link.parity == 'E' ? "even"
-                                                              : "odd";
     return text + fmt::format("baud = {}\nparity = \"{}\"\ndata_bits = {}\nstop_bits = {}\n", line.link.baud,
-                              parity, line.link.data_bits, line.link.stop_bits);
+                              parity_name(line.link.parity), line.link.data_bits, line.link.stop_bits);
 }
 
 std::string explain_line(const LineConfig& line) {
     const LinkOptions& link = line.link;
-    std::string text = fmt::format("\n[[line]]\nname = {}\n", toml_quoted(link.name));
+    std::string text = fmt::format("\n[[line]]\nname = {}\ntransport = \"{}\"\n", toml_quoted(link.name),
+                                   transport_name(link.transport));
     if (link.transport == Transport::rtu) {
-        text += "transport = \"rtu\"\n" + explain_serial(line);
+        text += explain_serial(line);
     } else {
-        text += fmt::format("transport = \"{}\"\nhost = {}\nport = {}\nconnect_timeout_ms = {}\n",
-                            link.transport == Transport::tcp ? "tcp" : "rtu_over_tcp", toml_quoted(link.host),
+        text += fmt::format("host = {}\nport = {}\nconnect_timeout_ms = {}\n", toml_quoted(link.host),
                             link.port, milliseconds(link.connect_timeout_s));
     }
     return text +

@@ -25,6 +25,16 @@ std::string names_of(const Index& index) {
     return names.empty() ? "there is none" : names;
 }
 
+IdentificationConfig identification_in(TableReader& reader) {
+    IdentificationConfig identification;
+    set(identification.tolerance_C, reader.number("tolerance_C", {0.01, 5.0}));
+    set(identification.max_lag, reader.integer("max_lag", {1, 100}));
+    set(identification.every_s, reader.number("every_s", {0.1, 3600.0}));
+    set(identification.sweep_always, reader.boolean("sweep_always"));
+    set(identification.workers, reader.integer("workers", {1, 64}));
+    return identification;
+}
+
 class Loader {
   public:
     Loader(const toml::table& root, const ProfileLookup& lookup, Complaints& complaints)
@@ -114,14 +124,7 @@ class Loader {
         }
     }
 
-    void read_identification(TableReader& reader) {
-        IdentificationConfig& identification = config_.identification;
-        set(identification.tolerance_C, reader.number("tolerance_C", {0.01, 5.0}));
-        set(identification.max_lag, reader.integer("max_lag", {1, 100}));
-        set(identification.every_s, reader.number("every_s", {0.1, 3600.0}));
-        set(identification.sweep_always, reader.boolean("sweep_always"));
-        set(identification.workers, reader.integer("workers", {1, 64}));
-    }
+    void read_identification(TableReader& reader) { config_.identification = identification_in(reader); }
 
     std::string read_name(TableReader& reader, std::string_view fallback) {
         const auto name = reader.text("name");
@@ -405,6 +408,17 @@ Result<Config> load_config(std::string_view toml, std::string_view file_name, co
     Config config = Loader(*root, lookup, complaints).load();
     if (!complaints.empty()) return std::unexpected(complaints.error());
     return config;
+}
+
+IdentificationConfig stored_identification(std::string_view toml) {
+    Complaints complaints("");
+    const auto root = parse_toml(toml, complaints);
+    if (!root) return {};
+    TableReader reader(*root, "", complaints);
+    const toml::table* const table = reader.table("identification");
+    if (table == nullptr) return {};
+    TableReader identification(*table, "identification", complaints);
+    return identification_in(identification);
 }
 
 }  // namespace thermbal

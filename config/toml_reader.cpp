@@ -215,6 +215,22 @@ void TableReader::finish() {
     }
 }
 
+std::string_view transport_name(Transport transport) {
+    switch (transport) {
+        case Transport::tcp:
+            return "tcp";
+        case Transport::rtu:
+            return "rtu";
+        case Transport::rtu_over_tcp:
+            return "rtu_over_tcp";
+    }
+    return "";
+}
+
+std::string_view parity_name(char parity) {
+    return parity == 'N' ? "none" : parity == 'E' ? "even" : "odd";
+}
+
 std::string toml_quoted(std::string_view text) {
     std::string result = "\"";
     for (const char c : text) {

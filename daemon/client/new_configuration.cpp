@@ -8,18 +8,18 @@ namespace thermbal {
 namespace {
 
 std::string line_text(const LinkOptions& link) {
-    std::string text = "[[line]]                     # one Modbus connection\nname = \"line\"\n";
+    std::string text = fmt::format(
+        "[[line]]                     # one Modbus connection\nname = \"line\"\ntransport = \"{}\"\n",
+        transport_name(link.transport));
     if (link.transport == Transport::rtu) {
-        const char* const parity = link.parity == 'N' ? "none" : link.parity == 'E' ? "even" : "odd";
-        return text + fmt::format(
-                          "transport = \"rtu\"\ndevice = {}    # a path of /dev/serial/by-id stays after "
-                          "replugging\nbaud = {}\nparity = \"{}\"\nresponse_timeout_ms = {}\n",
-                          thermbal::toml_quoted(link.device), link.baud, parity,
-                          link.response_timeout_s * 1000.0);
+        text += fmt::format(
+            "device = {}    # a path of /dev/serial/by-id stays after replugging\nbaud = {}\nparity = "
+            "\"{}\"\n",
+            toml_quoted(link.device), link.baud, parity_name(link.parity));
+    } else {
+        text += fmt::format("host = {}\nport = {}\n", toml_quoted(link.host), link.port);
     }
-    return text + fmt::format("transport = \"{}\"\nhost = {}\nport = {}\nresponse_timeout_ms = {}\n",
-                              link.transport == Transport::tcp ? "tcp" : "rtu_over_tcp",
-                              thermbal::toml_quoted(link.host), link.port, link.response_timeout_s * 1000.0);
+    return text + fmt::format("response_timeout_ms = {}\n", link.response_timeout_s * 1000.0);
 }
 
 std::string unit_text(const NewConfiguration::Unit& unit) {
@@ -27,7 +27,7 @@ std::string unit_text(const NewConfiguration::Unit& unit) {
         "\n[[unit]]                     # one module\nname = \"unit {}\"\nline = \"line\"\nunit_id = "
         "{}\nprofile = "
         "{}    # its register map\n",
-        unit.unit_id, unit.unit_id, thermbal::toml_quoted(unit.profile));
+        unit.unit_id, unit.unit_id, toml_quoted(unit.profile));
 }
 
 std::string channel_text(const NewConfiguration& wanted, const NewConfiguration::Channel& channel) {
@@ -35,7 +35,7 @@ std::string channel_text(const NewConfiguration& wanted, const NewConfiguration:
         channel.ambient ? "role = \"ambient\"             # the room: the reference, never required\n" : "";
     return fmt::format("\n[[channel]]\nname = \"{}\"\nunit = \"unit {}\"\ninput = {}\n{}place = {}\n",
                        channel.name, wanted.units[channel.unit].unit_id, channel.input, role,
-                       thermbal::toml_quoted(channel.place));
+                       toml_quoted(channel.place));
 }
 
 }  // namespace
@@ -54,6 +54,16 @@ std::vector<NewConfiguration::Channel> channels_of_inputs(const std::vector<int>
     return channels;
 }
 
+std::string modules_text(const NewConfiguration& wanted) {
+    std::string text = line_text(wanted.link);
+    for (const NewConfiguration::Unit& unit : wanted.units) text += unit_text(unit);
+    text +=
+        "\n# One [[channel]] a sensor; input as printed on the module. required = false: the end does not "
+        "wait for it.\n";
+    for (const NewConfiguration::Channel& channel : wanted.channels) text += channel_text(wanted, channel);
+    return text;
+}
+
 std::string configuration_text(const NewConfiguration& wanted) {
     std::string text = fmt::format(
         "# Made by thermbalctl new. `thermbald --check-config FILE` says what is wrong with it, or what is "
@@ -63,11 +73,11 @@ std::string configuration_text(const NewConfiguration& wanted) {
         "period_s = 15.0              # one scan of all channels\n"
         "keep_measuring = false       # true: go on after the declaration, so that it can be checked\n"
         "start = \"{}\"             # \"manual\": thermbalctl start\n\n",
-        thermbal::toml_quoted(wanted.test_name), thermbal::toml_quoted(wanted.machine),
+        toml_quoted(wanted.test_name), toml_quoted(wanted.machine),
         wanted.start_automatically ? "auto" : "manual");
-    text += fmt::format("[store]\npath = {}\n\n[service]\nsocket = {}\n\n[log]\nlevel = {}\n\n",
-                        thermbal::toml_quoted(wanted.database), thermbal::toml_quoted(wanted.socket),
-                        thermbal::toml_quoted(wanted.log_level));
+    text +=
+        fmt::format("[store]\npath = {}\n\n[service]\nsocket = {}\n\n[log]\nlevel = {}\n\n",
+                    toml_quoted(wanted.database), toml_quoted(wanted.socket), toml_quoted(wanted.log_level));
     text += fmt::format(
         "[identification]\ntolerance_C = 0.2            # a channel is declared when its steady state is "
         "known "
@@ -75,13 +85,7 @@ std::string configuration_text(const NewConfiguration& wanted) {
         wanted.sweep_always);
     text +=
         "[stop]                       # what happens on the machine at the end\n" + wanted.stop_toml + "\n";
-    text += line_text(wanted.link);
-    for (const NewConfiguration::Unit& unit : wanted.units) text += unit_text(unit);
-    text +=
-        "\n# One [[channel]] a sensor; input as printed on the module. required = false: the end does not "
-        "wait for it.\n";
-    for (const NewConfiguration::Channel& channel : wanted.channels) text += channel_text(wanted, channel);
-    return text;
+    return text + modules_text(wanted);
 }
 
 }  // namespace thermbal

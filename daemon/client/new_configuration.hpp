@@ -35,10 +35,13 @@ struct NewConfiguration {
     std::vector<Channel> channels;
 };
 
-/// T1 ... of all inputs of the units in their order, at most 16 channels; `ambient` names the one that
+/// T1 ... of all inputs of the units in their order, at most `most` channels; `ambient` names the one that
 /// measures the room, or is "none". `inputs[k]` belongs to unit k.
 std::vector<NewConfiguration::Channel> channels_of_inputs(const std::vector<int>& inputs, std::size_t most,
                                                           const std::string& ambient);
+
+/// The line, its units and their channels as TOML.
+std::string modules_text(const NewConfiguration& wanted);
 
 /// A commented configuration that load_config accepts as long as the profiles are there.
 std::string configuration_text(const NewConfiguration& wanted);

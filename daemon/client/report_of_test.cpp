@@ -3,9 +3,10 @@
 #include <map>
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
+#include "compute/flow_options.hpp"
 #include "compute/threads.hpp"
+#include "config/load.hpp"
 #include "report/verdict_json.hpp"
 #include "report_command.hpp"
 #include "report_courses.hpp"
@@ -16,21 +17,6 @@ namespace {
 using nlohmann::json;
 
 constexpr std::int64_t most_events = 400;
-
-/// As the configuration of that day had it; the daemon's defaults where it does not say.
-FlowOptions configured_flow(const std::string& config_toml) {
-    FlowOptions flow;
-    bool sweep_always = true;
-    try {
-        const toml::table config = toml::parse(config_toml);
-        flow.tolerance_C = config["identification"]["tolerance_C"].value_or(flow.tolerance_C);
-        sweep_always = config["identification"]["sweep_always"].value_or(sweep_always);
-        // A test is shown whatever its configuration looked like. NOLINTNEXTLINE(bugprone-empty-catch)
-    } catch (const toml::parse_error&) {
-    }
-    if (sweep_always) flow.sweep_when = SweepWhen::always;
-    return flow;
-}
 
 std::optional<ChannelVerdict> verdict_in(const std::string& stored) {
     auto verdict = verdict_from_json(json::parse(stored, nullptr, false));
@@ -100,7 +86,7 @@ Result<TestReport> report_of_test(const Reader& reader, TestId id, const ReportO
     const auto stored = reader.test(id);
     if (!stored) return std::unexpected(stored.error());
     const TestRecord& record = stored->record;
-    FlowOptions flow = configured_flow(record.config_toml);
+    FlowOptions flow = flow_options(stored_identification(record.config_toml));
     TestReport report{.name = record.name,
                       .machine = record.machine,
                       .source = fmt::format("test {}", id),

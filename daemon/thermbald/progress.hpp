@@ -10,8 +10,8 @@ namespace thermbal {
 
 /// Whether the daemon does its work: every line delivers the scans of its grid (a scan in which no module
 /// answered counts: the line's thread came back in time), and the store answers (a refusal counts: the scans
-/// wait in memory, which a restart would throw away). Times are CLOCK_BOOTTIME or any other that stands still
-/// for nobody, in ns. One thread.
+/// wait in memory, which a restart would throw away). Times are CLOCK_MONOTONIC, in ns: while the host
+/// sleeps nobody stands still. One thread.
 class Progress {
   public:
     Progress(std::vector<std::string> line_names, std::int64_t limit_ns, std::int64_t now_ns);

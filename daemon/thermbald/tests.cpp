@@ -5,10 +5,10 @@
 #include <spdlog/spdlog.h>
 
 #include "compute/earlier_tests.hpp"
+#include "compute/flow_options.hpp"
 #include "config/load.hpp"
 #include "config/model_file.hpp"
 #include "daemon.hpp"
-#include "flow_options.hpp"
 #include "report/spectrum_json.hpp"
 #include "report/verdict_json.hpp"
 #include "watches.hpp"
@@ -100,7 +100,9 @@ Result<TestId> Daemon::start_test(TestPlan plan) {
 
 /// The live flow's options for this test, with what earlier tests of the machine say.
 void Daemon::prepare_flow(const std::string& machine) {
-    auto flow = std::make_shared<FlowOptions>(flow_options(options_.config));
+    auto flow = std::make_shared<FlowOptions>(flow_options(options_.config.identification));
+    if (const auto ambient = options_.config.ambient())
+        flow->ambient = options_.config.channels[*ambient].name;
     test_.machine = machine;
     if (!machine.empty()) {
         auto earlier = prior_of_machine(storage_.store().read(), machine, flow->spectrum);

@@ -70,8 +70,10 @@ def units_of_unequal_size_as_three_by_six_has_them():
 
 
 def over_a_serial_line():
-    with Simulator("--rtu", "--units", "4,4,4,4") as sim:
-        result = probe("rtu", sim.path, "--baud", "9600", "--parity", "N", "--units", "1-5", "--timeout-ms", "100")
+    with Simulator("--rtu", "--units", "4,4,4,4") as sim, tempfile.TemporaryDirectory() as folder:
+        device = pathlib.Path(folder) / 'the "left" port'
+        device.symlink_to(sim.path)
+        result = probe("rtu", str(device), "--baud", "9600", "--parity", "N", "--units", "1-5", "--timeout-ms", "100")
     assert [unit["unit_id"] for unit in result["units"]] == [1, 2, 3, 4]
     assert is_accepted(result).count("[[channel]]") == 16
 

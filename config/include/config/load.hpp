@@ -19,6 +19,10 @@ using ProfileLookup = std::function<Result<ModuleProfile>(std::string_view name)
 /// the order of the file. Unknown keys are mistakes.
 Result<Config> load_config(std::string_view toml, std::string_view file_name, const ProfileLookup& lookup);
 
+/// [identification] of the configuration that a test was stored with, perhaps by an older version: defaults
+/// where it says nothing that is accepted today.
+IdentificationConfig stored_identification(std::string_view toml);
+
 /// The effective configuration, defaults included, as TOML that load_config accepts and that means the same.
 std::string explain_config(const Config& config);
 

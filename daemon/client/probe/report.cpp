@@ -8,6 +8,7 @@
 
 #include "columns.hpp"
 #include "config/load.hpp"
+#include "new_configuration.hpp"
 
 namespace thermbal {
 namespace {
@@ -132,28 +133,6 @@ std::optional<Choice> choose(const ProbedUnit& unit) {
     return choice;
 }
 
-std::string line_toml(const LinkOptions& link) {
-    if (link.transport != Transport::rtu) {
-        return fmt::format("[[line]]\nname = \"line\"\ntransport = \"{}\"\nhost = \"{}\"\nport = {}\n",
-                           link.transport == Transport::tcp ? "tcp" : "rtu_over_tcp", link.host, link.port);
-    }
-    const char* const parity = link.parity == 'N' ? "none" : link.parity == 'E' ? "even" : "odd";
-    return fmt::format(
-        "[[line]]\nname = \"line\"\ntransport = \"rtu\"\ndevice = \"{}\"\nbaud = {}\nparity = \"{}\"\n",
-        link.device, link.baud, parity);
-}
-
-std::string channels_toml(const Choice& choice, std::size_t& channel) {
-    std::string text;
-    for (int input = 1; input <= choice.profile.inputs && channel < most_channels; ++input) {
-        ++channel;
-        text += fmt::format("\n[[channel]]\nname = \"T{}\"\nunit = \"unit {}\"\ninput = {}\n{}place = \"\"\n",
-                            channel, choice.unit->unit_id, input,
-                            channel == 1 ? "role = \"ambient\"             # or another one, or none\n" : "");
-    }
-    return text;
-}
-
 }  // namespace
 
 std::string probe_text(const ProbeResult& result) {
@@ -182,9 +161,8 @@ json probe_json(const ProbeResult& result) {
 
 Result<StartingPoint> starting_point(const ProbeResult& result) {
     StartingPoint start;
-    std::string units;
-    std::string channels;
-    std::size_t channel = 0;
+    NewConfiguration found;
+    std::vector<int> inputs;
     for (const ProbedUnit& unit : result.units) {
         auto choice = choose(unit);
         if (!choice) continue;
@@ -195,18 +173,21 @@ Result<StartingPoint> starting_point(const ProbeResult& result) {
             if (start.profile_name.empty()) start.profile_toml = explain_profile(choice->profile);
             start.profile_name = "probed";
         }
-        units +=
-            fmt::format("\n[[unit]]\nname = \"unit {}\"\nline = \"line\"\nunit_id = {}\nprofile = \"{}\"\n",
-                        unit.unit_id, unit.unit_id, choice->profile.name);
-        channels += channels_toml(*choice, channel);
+        found.units.push_back({unit.unit_id, choice->profile.name});
+        inputs.push_back(choice->profile.inputs);
     }
-    if (units.empty()) {
+    if (found.units.empty()) {
         return fail(NextStep::stop,
                     "no unit gave registers that read like temperatures: nothing to start from");
     }
+    // It was asked with patience of its own; the daemon's is another.
+    const double timeout_s = found.link.response_timeout_s;
+    found.link = result.units.front().link;
+    found.link.response_timeout_s = timeout_s;
+    found.channels = channels_of_inputs(inputs, most_channels, "T1");
     start.config_toml =
         "# Made by thermbalctl probe. Give the channels their places, and say which is the ambient.\n" +
-        line_toml(result.units.front().link) + units + channels;
+        modules_text(found);
     return start;
 }
 
