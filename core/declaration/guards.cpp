@@ -20,13 +20,6 @@ const ChannelEstimate* estimate_of(const SpectrumEstimate* estimate, const std::
     return found == estimate->channels.end() ? nullptr : &*found;
 }
 
-double last_good(std::span<const double> values) {
-    for (std::size_t i = values.size(); i-- > 0;) {
-        if (std::isfinite(values[i])) return values[i];
-    }
-    return no_value;
-}
-
 /// What a sensor said until it fell silent is no ground for a declaration now.
 Guard newest_sample_is_fresh(const GuardEvidence& evidence, const GuardOptions& options) {
     const std::vector<double>& values = evidence.samples.values;

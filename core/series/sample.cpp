@@ -1,5 +1,6 @@
 #include "series/sample.hpp"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -32,6 +33,17 @@ std::optional<Quality> quality_from_string(std::string_view name) {
         if (known == name) return value;
     }
     return std::nullopt;
+}
+
+double first_good(std::span<const double> values) {
+    const auto found = std::ranges::find_if(values, [](double value) { return std::isfinite(value); });
+    return found == values.end() ? no_value : *found;
+}
+
+double last_good(std::span<const double> values) {
+    const auto found =
+        std::find_if(values.rbegin(), values.rend(), [](double value) { return std::isfinite(value); });
+    return found == values.rend() ? no_value : *found;
 }
 
 double mean_of_good(std::span<const double> values) {

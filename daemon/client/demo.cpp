@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "address.hpp"
 #include "child_process.hpp"
 #include "columns.hpp"
 #include "fields.hpp"
@@ -98,10 +99,10 @@ Result<LinkOptions> link_to(const std::string& announcement) {
         link.baud = 19200;
         return link;
     }
-    const std::string first = address.substr(0, address.find(' '));
-    if (!announcement.starts_with("ready tcp ") || first.find(':') == std::string::npos)
+    const auto first = network_address(address.substr(0, address.find(' ')));
+    if (!announcement.starts_with("ready tcp ") || !first || !first->port)
         return trouble(fmt::format("thermbal-sim: found \"{}\" where its address is expected", announcement));
-    link.port = std::atoi(first.substr(first.rfind(':') + 1).c_str());
+    link.port = *first->port;
     return link;
 }
 

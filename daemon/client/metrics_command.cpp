@@ -6,6 +6,7 @@
 
 #include "ask.hpp"
 #include "commands.hpp"
+#include "dashboard/access.hpp"
 #include "dashboard/exclusive_port.hpp"
 #include "files.hpp"
 #include "metrics.hpp"
@@ -56,27 +57,10 @@ int print_metrics(const MetricsFlags& flags) {
     return text ? status : report_error({NextStep::stop, text.error().message});
 }
 
-struct Address {
-    std::string host;
-    int port = 0;
-};
-
 /// Readings of a machine are for the machine's own host; a proxy in front of it may decide otherwise.
-Result<Address> loopback_address(const std::string& text) {
-    const std::size_t colon = text.rfind(':');
-    Address address;
-    std::string rest;
-    if (colon != std::string::npos) {
-        address.host = text.substr(0, colon);
-        rest = text.substr(colon + 1);
-    }
-    const bool digits =
-        !rest.empty() && rest.size() <= 5 && rest.find_first_not_of("0123456789") == std::string::npos;
-    address.port = digits ? std::stoi(rest) : 0;
-    if (address.host == "[::1]") address.host = "::1";
-    const bool loopback =
-        address.host == "localhost" || address.host == "::1" || address.host.starts_with("127.");
-    if (!loopback || address.port < 1 || address.port > 65535)
+Result<ListenAddress> loopback_address(const std::string& text) {
+    auto address = parse_listen_address(text);
+    if (!address || !address->is_loopback() || address->port < 1)
         return fail(
             NextStep::refuse_input,
             fmt::format("--listen: found \"{}\"; accepted: 127.0.0.1:PORT, [::1]:PORT or localhost:PORT; "

@@ -11,17 +11,6 @@
 namespace thermbal {
 namespace {
 
-double first_good(const std::vector<double>& values) {
-    const auto found = std::ranges::find_if(values, [](double value) { return std::isfinite(value); });
-    return found == values.end() ? no_value : *found;
-}
-
-double last_good(const std::vector<double>& values) {
-    const auto found = std::ranges::find_if(values.rbegin(), values.rend(),
-                                            [](double value) { return std::isfinite(value); });
-    return found == values.rend() ? no_value : *found;
-}
-
 bool is_declared(const ReportChannel& channel) {
     return channel.verdict && channel.verdict->declared();
 }

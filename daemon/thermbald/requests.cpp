@@ -95,11 +95,6 @@ double time_left_min(double equilibrium_time_min, double now_min) {
     return std::isfinite(equilibrium_time_min) ? std::max(0.0, equilibrium_time_min - now_min) : no_value;
 }
 
-double first_good(const std::vector<double>& values) {
-    const auto found = std::ranges::find_if(values, [](double value) { return std::isfinite(value); });
-    return found == values.end() ? no_value : *found;
-}
-
 /// So many samples are read and written in 30 ms, during which no other event is served.
 std::int64_t most_scans(std::size_t channels) {
     constexpr std::size_t most_samples = 20'000;

@@ -49,22 +49,11 @@ std::vector<double> RecordedScans::at(double time_s) const {
     // Half a millisecond of slack: a scan asked for at its own time must not get the row before it.
     const auto later = std::ranges::upper_bound(test_.time_s, time_s + 5e-4);
     const auto rows_until = later - test_.time_s.begin();
-    return row(rows_until == 0 ? 0 : static_cast<std::size_t>(rows_until - 1));
-}
-
-std::vector<double> RecordedScans::row(std::size_t scan) const {
-    const std::size_t k = std::min(scan, scans() - 1);
+    const auto row = static_cast<std::size_t>(std::max<std::ptrdiff_t>(rows_until - 1, 0));
     std::vector<double> values;
     values.reserve(test_.channels.size());
-    for (const Column& channel : test_.channels) values.push_back(channel.values[k]);
+    for (const Column& channel : test_.channels) values.push_back(channel.values[row]);
     return values;
-}
-
-std::vector<std::string> RecordedScans::channels() const {
-    std::vector<std::string> names;
-    names.reserve(test_.channels.size());
-    for (const Column& channel : test_.channels) names.push_back(channel.name);
-    return names;
 }
 
 }  // namespace thermbal

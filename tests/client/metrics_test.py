@@ -81,7 +81,7 @@ class Metrics(DaemonCase):
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
-        for address in (f"0.0.0.0:{port}", f"192.0.2.1:{port}", "127.0.0.1", "127.0.0.1:0", "127.0.0.1:99999999999", ":9"):
+        for address in (f"0.0.0.0:{port}", f"192.0.2.1:{port}", f"127.any.name:{port}", "127.0.0.1", "127.0.0.1:0", "127.0.0.1:99999999999", ":9"):
             made = run("metrics", "--socket", self.socket, "--listen", address)
             self.assertEqual(made.returncode, 2, address)
             self.assertIn(address, made.stderr)

@@ -48,7 +48,6 @@ TEST(Identifier, TheNewestWindowWinsOverOneThatStillWaits) {
         [&](IdentificationResult result) { results.add(std::move(result)); });
     identifier.submit({1, 10, {}, {}, {}});
     while (begun == 0) std::this_thread::yield();
-    EXPECT_TRUE(identifier.busy());
     identifier.submit({1, 20, {}, {}, {}});
     identifier.submit({1, 30, {}, {}, {}});
     go = true;

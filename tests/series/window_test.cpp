@@ -13,6 +13,14 @@ using testing::DoubleEq;
 using testing::ElementsAre;
 using testing::NanSensitiveDoubleEq;
 
+TEST(GoodValues, FirstAndLastPassOverWhatIsMissing) {
+    const std::vector<double> values{no_value, 2.0, no_value, 3.0, no_value};
+    EXPECT_EQ(first_good(values), 2.0);
+    EXPECT_EQ(last_good(values), 3.0);
+    EXPECT_TRUE(std::isnan(first_good({})));
+    EXPECT_TRUE(std::isnan(last_good(std::vector{no_value})));
+}
+
 TEST(Window, RowsGoToTheirScanAndWhatIsNotThereStaysMissing) {
     const RecordedTest test{
         {0.0, 15.2, 44.9, 45.1}, {{"T1", {1.0, 2.0, 4.0, 6.0}}}, {{"spindle_rpm", {0, 5000, 5000, 0}}}};

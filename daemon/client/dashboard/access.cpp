@@ -1,22 +1,16 @@
 #include "access.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
 
+#include "address.hpp"
 #include "files.hpp"
 
 namespace thermbal {
 namespace {
-
-/// The host of "host:port", "[v6]:port" or of either without a port.
-std::string_view host_of(std::string_view text) {
-    if (text.starts_with('[')) return text.substr(1, text.find(']') - 1);
-    return text.substr(0, text.find(':'));
-}
 
 std::string lower(std::string_view text) {
     std::string made(text);
@@ -42,19 +36,15 @@ Result<ListenAddress> parse_listen_address(std::string_view text) {
             NextStep::refuse_input,
             fmt::format("--listen {}: expected ADDRESS:PORT, e.g. 127.0.0.1:8087 or [::1]:8087", text));
     };
-    const std::size_t colon = text.rfind(':');
-    if (colon == std::string_view::npos) return wrong();
-    ListenAddress address{std::string(host_of(text)), 0};
-    const std::string_view port = text.substr(colon + 1);
-    const auto [end, trouble] = std::from_chars(port.data(), port.data() + port.size(), address.port);
-    const bool is_port = trouble == std::errc() && end == port.data() + port.size() && address.port >= 0 &&
-                         address.port <= 65535;
-    if (!is_port || (address.host != "localhost" && !is_address(address.host))) return wrong();
-    return address;
+    const auto address = network_address(text);
+    if (!address || !address->port || (address->host != "localhost" && !is_address(address->host)))
+        return wrong();
+    return ListenAddress{address->host, *address->port};
 }
 
 bool PageAccess::allows_host(std::string_view host_header) const {
-    return std::ranges::find(hosts, lower(host_of(host_header))) != hosts.end();
+    const auto asked = network_address(host_header);
+    return asked && std::ranges::find(hosts, lower(asked->host)) != hosts.end();
 }
 
 bool PageAccess::allows_token(std::string_view given) const {

@@ -30,6 +30,8 @@ inline constexpr double no_value = std::numeric_limits<double>::quiet_NaN();
 
 /// Of those that are values; no_value when none is.
 double mean_of_good(std::span<const double> values);
+double first_good(std::span<const double> values);
+double last_good(std::span<const double> values);
 
 /// One channel at one scan. `raw` is the register as the module sent it (16 or 32 bits, sign not applied);
 /// empty when the module did not answer. `source_C` is what the module said where a calibration has made

@@ -61,7 +61,6 @@ class ScanAssembler {
 
     /// When the oldest open scan is closed at the latest.
     std::int64_t next_close_ns() const { return grid_.due_ns(next_ + 1); }
-    std::int64_t next_scan() const { return next_; }
     const Grid& grid() const { return grid_; }
 
   private:

@@ -47,11 +47,6 @@ class NewestFirst {
         cancelled_before_ = job_number_ + 1;
     }
 
-    bool busy() const {
-        const std::lock_guard lock(mutex_);
-        return working_ || waiting_.has_value();
-    }
-
   private:
     void run(const std::stop_token& stop) {
         put_this_thread_last();
@@ -60,10 +55,8 @@ class NewestFirst {
             std::uint64_t number = 0;
             {
                 std::unique_lock lock(mutex_);
-                working_ = false;
                 if (!changed_.wait(lock, stop, [this] { return waiting_.has_value(); })) return;
                 job = std::exchange(waiting_, std::nullopt);
-                working_ = true;
                 number = ++job_number_;
             }
             const auto cancelled = [&] {
@@ -77,10 +70,9 @@ class NewestFirst {
 
     const Work work_;
     const std::function<void(Outcome)> done_;
-    mutable std::mutex mutex_;
+    std::mutex mutex_;
     std::condition_variable_any changed_;
     std::optional<Job> waiting_;  // guarded by mutex_, as the rest
-    bool working_ = false;
     std::uint64_t cancelled_before_ = 0;
     std::uint64_t job_number_ = 0;
     std::jthread thread_;  // last: it uses all of the above

@@ -21,13 +21,6 @@ class RecordedScans {
     /// One value a channel of the recording, in its order, C; NaN where that row has no sample. A time before
     /// the first row gets the first row, one after the last row the last.
     std::vector<double> at(double time_s) const;
-    /// Row `scan` of the recording; the last one for any later scan.
-    std::vector<double> row(std::size_t scan) const;
-
-    std::size_t scans() const { return test_.time_s.size(); }
-    double end_s() const { return test_.time_s.back(); }
-    std::vector<std::string> channels() const;
-    const RecordedTest& test() const { return test_; }
 
   private:
     explicit RecordedScans(RecordedTest test) : test_(std::move(test)) {}
