@@ -234,8 +234,9 @@ void Daemon::on_line_readings() {
 void Daemon::close_overdue_scans() {
     constexpr std::size_t most_at_once = 200;
     const std::uint64_t generation = generation_;
-    for (Scan& scan : assembler_->take_closed(clock_.monotonic_ns() - close_grace_ns,
-                                              clock_.wall_ns() - close_grace_ns, most_at_once)) {
+    std::vector<Scan> closed = assembler_->take_closed(clock_.monotonic_ns() - close_grace_ns,
+                                                       clock_.wall_ns() - close_grace_ns, most_at_once);
+    for (Scan& scan : closed) {
         (scan.status == ScanStatus::missed ? scans_missed_
          : scan.status == ScanStatus::late ? scans_late_
                                            : scans_ok_)++;
@@ -243,7 +244,7 @@ void Daemon::close_overdue_scans() {
         if (generation != generation_)
             break;  // a test began or ended on this scan: the others belong to the old grid
     }
-    see_to_storage();
+    if (!closed.empty()) see_to_storage();
     leave_if_done();
     arm_close_timer();
 }

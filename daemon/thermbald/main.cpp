@@ -98,9 +98,13 @@ Result<void> check_stop_command(const Config& config, const std::string& file) {
                                                               : "is not there"));
 }
 
+int status_of(const Error& error) {
+    return error.next == NextStep::refuse_input ? 2 : 1;
+}
+
 int refused(const Error& error) {
     print_error_line(error.message);
-    return error.next == NextStep::refuse_input ? 2 : 1;
+    return status_of(error);
 }
 
 int answered(const std::string& text) {
@@ -190,7 +194,7 @@ int main(int argc, char** argv) {
     if (!daemon) return refused(daemon.error());
     if (const auto ended = (*daemon)->run(); !ended) {
         spdlog::critical("{}", ended.error().message);
-        return ended.error().next == NextStep::refuse_input ? 2 : 1;
+        return status_of(ended.error());
     }
     return 0;
 }

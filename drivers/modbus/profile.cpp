@@ -93,6 +93,12 @@ Quality quality_of(const ModuleProfile& profile, double number, double value_C) 
     return Quality::good;
 }
 
+/// 304 tenths are the double 30.4, which 304 * 0.1 is not.
+double scaled(double number, double scale) {
+    const double per_unit = std::round(1.0 / scale);
+    return per_unit * scale == 1.0 ? number / per_unit : number * scale;
+}
+
 }  // namespace
 
 std::string_view to_string(RegisterType type) {
@@ -164,16 +170,6 @@ std::string check_profile(const ModuleProfile& profile) {
     }
     return {};
 }
-
-namespace {
-
-/// 304 tenths are the double 30.4, which 304 * 0.1 is not.
-double scaled(double number, double scale) {
-    const double per_unit = std::round(1.0 / scale);
-    return per_unit * scale == 1.0 ? number / per_unit : number * scale;
-}
-
-}  // namespace
 
 Sample decode(const ModuleProfile& profile, std::span<const std::uint16_t> registers) {
     Sample sample{.raw = std::nullopt, .value_C = no_value, .quality = Quality::communication};
