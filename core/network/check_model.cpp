@@ -208,6 +208,12 @@ class Checker {
                 complain(Table::effect, i, parameter.name,
                          fmt::format("found {}; accepted: a {}number", value,
                                      parameter.logarithmic ? "positive " : ""));
+            } else if (value < parameter.least_accepted || value > parameter.most_accepted) {
+                complain(Table::effect, i, parameter.name,
+                         fmt::format("found {}; accepted: {}{}", value, parameter.least_accepted,
+                                     std::isfinite(parameter.most_accepted)
+                                         ? fmt::format(" to {}", parameter.most_accepted)
+                                         : " or more"));
             }
         }
         for (const EffectParameter& given : effect.parameters) {

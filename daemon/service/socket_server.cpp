@@ -11,6 +11,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/epoll.h>
 #include <sys/socket.h>
 #include <sys/timerfd.h>
@@ -82,7 +83,8 @@ int code_of(NextStep next) {
 }
 
 /// An empty set means all topics.
-Result<std::set<std::string, std::less<>>> topics_in(const json& params) {
+Result<std::set<std::string, std::less<>>> topics_in(const json& params,
+                                                     const std::set<std::string, std::less<>>& known) {
     std::set<std::string, std::less<>> topics;
     const auto list = params.find("topics");
     if (list == params.end()) return topics;
@@ -92,6 +94,11 @@ Result<std::set<std::string, std::less<>>> topics_in(const json& params) {
         return fail(NextStep::refuse_input,
                     fmt::format("subscribe: topics must be a list of 1 to {} names", most_topics));
     for (const auto& topic : *list) topics.insert(topic.get<std::string>());
+    const auto unknown = std::ranges::find_if(topics, [&](const auto& topic) { return !known.contains(topic); });
+    if (unknown != topics.end()) {
+        return fail(NextStep::refuse_input,
+                    fmt::format("subscribe: no such topic; there are: {}", fmt::join(known, ", ")));
+    }
     return topics;
 }
 
@@ -110,6 +117,7 @@ struct SocketServer::Parts {
     Descriptor refill_timer;
     Descriptor spare;  ///< given up to accept and refuse when the process has no descriptor left
     std::map<std::string, Method, std::less<>> methods;
+    std::set<std::string, std::less<>> topics;
     std::map<int, Client> clients;
     Counters counters;
     bool dispatching = false;
@@ -336,10 +344,10 @@ Result<json> SocketServer::Parts::result_of(Client& client, json_rpc::Call& call
 }
 
 Result<json> SocketServer::Parts::subscribe(Client& client, const json& params) const {
-    auto topics = topics_in(params);
-    if (!topics) return std::unexpected(topics.error());
+    auto chosen = topics_in(params, topics);
+    if (!chosen) return std::unexpected(chosen.error());
     client.subscribed = true;
-    client.topics = std::move(*topics);
+    client.topics = std::move(*chosen);
     if (client.topics.empty()) return json{{"subscribed", "all"}};
     return json{{"subscribed", client.topics}};
 }
@@ -420,6 +428,7 @@ Result<SocketServer> SocketServer::open(const SocketServerOptions& options) {
                                                          {},
                                                          {},
                                                          {},
+                                                         {},
                                                          false,
                                                          false,
                                                          false}));
@@ -431,6 +440,10 @@ Result<SocketServer> SocketServer::open(const SocketServerOptions& options) {
 
 void SocketServer::add_method(std::string name, Access access, Handler handler) {
     parts_->methods.insert_or_assign(std::move(name), Parts::Method{access, std::move(handler)});
+}
+
+void SocketServer::add_topics(std::set<std::string, std::less<>> topics) {
+    parts_->topics.merge(topics);
 }
 
 int SocketServer::fd() const {

@@ -145,6 +145,7 @@ void Daemon::add_methods() {
     changes("stop_test", &Daemon::on_stop);
     changes("annotate", &Daemon::on_annotate);
     changes("set_inputs", &Daemon::on_set_inputs);
+    server_.add_topics({"scan", "predictions", "declaration", "comparison", "event", "status"});
 }
 
 Result<json> Daemon::status_json() const {

@@ -37,6 +37,7 @@ std::vector<std::string_view> words_of(std::string_view line) {
 std::string add_fault(std::string_view what, std::string_view for_s, FaultPlan& plan, double now_s) {
     auto fault = parse_fault_kind(what);
     if (!fault) return "error " + fault.error().message;
+    if (auto acts = check_reach(*fault, plan.reach()); !acts) return "error " + acts.error().message;
     fault->from_s = now_s;
     if (!for_s.empty()) {
         double seconds = 0.0;

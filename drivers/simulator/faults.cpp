@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 namespace thermbal {
 namespace {
@@ -157,6 +158,23 @@ std::string to_string(const Fault& fault) {
     text += fmt::format("@{}", fault.from_s);
     if (std::isfinite(fault.to_s)) text += fmt::format("-{}", fault.to_s);
     return text;
+}
+
+Result<void> check_reach(const Fault& fault, const FaultReach& reach) {
+    const FaultFraming wanted = entry_of(fault.kind).framing;
+    std::string what;
+    if (wanted != FaultFraming::any && reach.framing != FaultFraming::any && wanted != reach.framing) {
+        what = wanted == FaultFraming::tcp ? "exists on TCP only; take it out, or serve without --rtu"
+                                           : "exists on RTU only; take it out, or serve with --rtu";
+    } else if (fault.unit && !reach.units.empty() &&
+               std::ranges::find(reach.units, *fault.unit) == reach.units.end()) {
+        what = fmt::format("no such unit; there are: {}", fmt::join(reach.units, ", "));
+    } else if (fault.channel && *fault.channel >= reach.channels) {
+        what = fmt::format("no such channel; there are: T1 ... T{}", reach.channels);
+    } else {
+        return {};
+    }
+    return fail(NextStep::refuse_input, fmt::format("fault '{}': {}", to_string(fault), what));
 }
 
 std::size_t FaultPlan::clear(FaultKind kind) {

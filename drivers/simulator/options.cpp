@@ -263,6 +263,9 @@ Result<void> take_faults(const Flags& flags, SimulatorOptions& options) {
         if (!scenario) return std::unexpected(scenario.error());
         options.faults.insert(options.faults.end(), scenario->begin(), scenario->end());
     }
+    for (const Fault& fault : options.faults) {
+        if (auto acts = check_reach(fault, options.fault_reach()); !acts) return acts;
+    }
     options.control_path = flags.control_path;
     return check_lockstep(flags, options.faults);
 }
@@ -321,6 +324,17 @@ int answered(int status) {
 }
 
 }  // namespace
+
+FaultReach SimulatorOptions::fault_reach() const {
+    if (task != SimulatorTask::serve_tcp && task != SimulatorTask::serve_rtu) return {};
+    FaultReach reach{
+        .framing = task == SimulatorTask::serve_rtu ? FaultFraming::rtu : FaultFraming::tcp, .channels = 0};
+    for (const ModuleUnit& unit : units) {
+        reach.units.push_back(unit.id);
+        reach.channels = std::max(reach.channels, unit.first_channel + unit.channels);
+    }
+    return reach;
+}
 
 Result<std::vector<ModuleUnit>> parse_units(const std::string& text, int first_id,
                                             std::size_t most_channels) {

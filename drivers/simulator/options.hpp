@@ -43,6 +43,9 @@ struct SimulatorOptions {
     double time_scale = 1.0;
     std::optional<std::int64_t> time_epoch_ns;
     double spindle_start_s = 0.0;
+
+    /// What is served.
+    FaultReach fault_reach() const;
 };
 
 /// Either options, or the exit status that the program ends with at once (--help, --version: 0; wrong usage:

@@ -21,6 +21,7 @@ using ::testing::HasSubstr;
 class Server {
   public:
     explicit Server(const std::filesystem::path& path) : server_(SocketServer::open(at(path)).value()) {
+        server_.add_topics({"event"});
         server_.add_method("echo", Access::reads, [](const Request& request) { return request.params; });
         server_.add_method("busy", Access::reads, [](const Request&) -> Result<json> {
             return fail(NextStep::retry, "the database is locked");

@@ -38,6 +38,7 @@ SocketServer make_server() {
     };
     server.add_method("status", Access::reads, echo);
     server.add_method("stop_test", Access::changes, echo);
+    server.add_topics({"event", "scan"});
     return server;
 }
 

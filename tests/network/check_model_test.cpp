@@ -86,6 +86,18 @@ INSTANTIATE_TEST_SUITE_P(
         Mistaken{"parameter_negative",
                  [](Model& m) { m.effects = {{"motor_heat", "", "sleeve", {{"power_W", -5.0}}, {}}}; },
                  Table::effect, 0, "power_W", "positive"},
+        Mistaken{"share_beyond_one",
+                 [](Model& m) {
+                     m.effects = {
+                         {"sensor_detached", "", "T2", {{"ambient_share", 1.5}, {"onset_s", 60}}, {}}};
+                 },
+                 Table::effect, 0, "ambient_share", "0 to 1"},
+        Mistaken{"more_switchings_than_a_computer_holds",
+                 [](Model& m) {
+                     m.effects = {
+                         {"coolant_cycling", "", "sleeve", {{"power_W", 5.0}, {"period_s", 1e-6}}, {}}};
+                 },
+                 Table::effect, 0, "period_s", "10 or more"},
         Mistaken{"parameter_unknown",
                  [](Model& m) {
                      m.effects = {{"motor_heat", "", "sleeve", {{"power_W", 5.0}, {"onset_s", 5}}, {}}};

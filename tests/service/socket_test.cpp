@@ -118,6 +118,9 @@ TEST_F(SocketTest, SubscribersHearTheirTopics) {
         scans.ask(
             R"({"jsonrpc":"2.0","id":1,"method":"subscribe","params":{"topics":"scan"}})")["error"]["code"],
         -32602);
+    const json unknown =
+        scans.ask(R"({"jsonrpc":"2.0","id":1,"method":"subscribe","params":{"topics":["scan","scans"]}})");
+    EXPECT_EQ(unknown["error"]["message"], "subscribe: no such topic; there are: event, scan");
     for (const char* topic : {"event", "scan"})
         other.ask(std::string(R"({"jsonrpc":"2.0","id":2,"method":"publish","params":{"topic":")") + topic +
                   R"(","params":{"scan":7}}})");

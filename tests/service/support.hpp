@@ -110,6 +110,7 @@ class LineClient {
 class RunningServer {
   public:
     explicit RunningServer(const SocketServerOptions& options) : server_(opened(options)) {
+        server_.add_topics({"event", "scan"});
         server_.add_method("echo", Access::reads, [](const Request& request) { return request.params; });
         server_.add_method("whoami", Access::reads, [](const Request& request) {
             return json{{"uid", request.peer.uid}, {"pid", request.peer.pid}};

@@ -32,5 +32,18 @@ TEST(Control, AnythingElseIsAnErrorThatSaysWhatIsAccepted) {
     EXPECT_TRUE(plan.faults().empty());
 }
 
+TEST(Control, AFaultThatCouldDoNothingOnThisLineIsRefused) {
+    FaultPlan plan({}, {.framing = FaultFraming::tcp, .units = {1, 2}, .channels = 8});
+    EXPECT_THAT(obey("fault wrong-crc", plan, 0.0), HasSubstr("RTU only"));
+    EXPECT_THAT(obey("fault late:3", plan, 0.0), HasSubstr("there are: 1, 2"));
+    EXPECT_THAT(obey("fault open:T9", plan, 0.0), HasSubstr("T1 ... T8"));
+    EXPECT_TRUE(plan.faults().empty());
+    for (const char* line : {"fault wrong-tid:2", "fault late", "fault open:T8", "fault open"}) {
+        EXPECT_THAT(obey(line, plan, 0.0), StartsWith("ok ")) << line;
+    }
+    FaultPlan of_a_port({}, {.framing = FaultFraming::rtu});
+    EXPECT_THAT(obey("fault refuse", of_a_port, 0.0), HasSubstr("TCP only"));
+}
+
 }  // namespace
 }  // namespace thermbal

@@ -11,6 +11,8 @@ namespace thermbal {
 namespace {
 
 constexpr double flat = std::numeric_limits<double>::infinity();
+/// Each switching is a step of the simulation: a month at this period is half a million.
+constexpr double shortest_period_s = 10.0;
 enum Form : std::size_t { square_wave, thermostat };
 
 void attach_square_wave(const PlacedEffect& effect, NetworkBuilder& network) {
@@ -79,13 +81,16 @@ EffectDefinition coolant_cycling_effect() {
                                    .upper = 14400,
                                    .prior_centre = 900,
                                    .prior_sigma = 0.8,
-                                   .logarithmic = true},
+                                   .logarithmic = true,
+                                   .least_accepted = shortest_period_s},
                                   {.name = "duty",
                                    .lower = 0.02,
                                    .upper = 0.98,
                                    .prior_centre = 0.5,
                                    .prior_sigma = 0.2,
-                                   .when_absent = 0.5},
+                                   .when_absent = 0.5,
+                                   .least_accepted = 0,
+                                   .most_accepted = 1},
                                   {.name = "first_on_s",
                                    .lower = -14400,
                                    .upper = 1e6,

@@ -68,7 +68,9 @@ EffectDefinition friction_viscosity_effect() {
                                        .lower = 0,
                                        .upper = 1,
                                        .prior_centre = 0.5,
-                                       .prior_sigma = 0.3},
+                                       .prior_sigma = 0.3,
+                                       .least_accepted = 0,
+                                       .most_accepted = 1},
                                       reference_parameter()}}},
             .source =
                 "viscous torque ~ (nu n)^(2/3), the rest follows the load (Palmgren; Harris, Rolling Bearing "

@@ -13,7 +13,13 @@ void attach(const PlacedEffect& effect, NetworkBuilder& network) {
 }
 
 EffectParameterDefinition ambient_share_parameter() {
-    return {.name = "ambient_share", .lower = 0, .upper = 1, .prior_centre = 0.5, .prior_sigma = 0.25};
+    return {.name = "ambient_share",
+            .lower = 0,
+            .upper = 1,
+            .prior_centre = 0.5,
+            .prior_sigma = 0.25,
+            .least_accepted = 0,
+            .most_accepted = 1};
 }
 
 /// Of the sensor itself, once the air cools it instead of the surface: faster than what lags behind a node.

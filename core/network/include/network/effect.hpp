@@ -52,6 +52,9 @@ struct EffectParameterDefinition {
     std::optional<double> when_absent =
         std::nullopt;      ///< may be left out: its value then, and it is not fitted
     bool is_time = false;  ///< a moment of the run: an onset, a switching
+    /// What a model file may say at all; the bounds above are a fit's.
+    double least_accepted = -std::numeric_limits<double>::infinity();
+    double most_accepted = std::numeric_limits<double>::infinity();
 };
 
 /// One way to write an effect down; most kinds have one. The first is the default.

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -54,7 +55,8 @@ struct SocketServerOptions {
 
 /// JSON-RPC 2.0 over a Unix stream socket, one document a line. Requests may be pipelined; replies come in
 /// their order; a request without id gets none; batches are refused (-32600). Params are named (an object).
-/// `subscribe` is built in: {"topics": ["scan", "event"]}, all topics without it; `unsubscribe` ends it.
+/// `subscribe` is built in: {"topics": ["scan", "event"]}, all topics without it; a topic that
+/// is none is refused; `unsubscribe` ends it.
 ///
 /// One thread. Nothing here waits: it hangs on an event loop by `fd` (readable: call `dispatch`).
 class SocketServer {
@@ -66,6 +68,8 @@ class SocketServer {
 
     /// REQUIRES: before the first dispatch; a name once.
     void add_method(std::string name, Access access, Handler handler);
+    /// What may be subscribed to and is published. REQUIRES: before the first dispatch.
+    void add_topics(std::set<std::string, std::less<>> topics);
 
     int fd() const;
     /// Serves what is ready, then returns. Handlers may call publish.

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/error.hpp"
@@ -37,6 +38,16 @@ Result<Fault> parse_fault(std::string_view text);
 /// As parse_fault accepts it.
 std::string to_string(const Fault& fault);
 
+/// What there is for a fault to act on. As made here: everything.
+struct FaultReach {
+    FaultFraming framing = FaultFraming::any;
+    std::vector<std::uint8_t> units = {};  ///< empty: any
+    std::size_t channels = 16;
+};
+
+/// Errors (refuse_input): the fault would never do anything there.
+Result<void> check_reach(const Fault& fault, const FaultReach& reach);
+
 /// What is wrong with the socket or the port itself.
 struct EndpointState {
     bool refuses = false;
@@ -51,13 +62,15 @@ struct EndpointState {
 class FaultPlan {
   public:
     FaultPlan() = default;
-    explicit FaultPlan(std::vector<Fault> faults) : faults_(std::move(faults)) {}
+    explicit FaultPlan(std::vector<Fault> faults, FaultReach reach = {})
+        : faults_(std::move(faults)), reach_(std::move(reach)) {}
 
     void add(const Fault& fault) { faults_.push_back(fault); }
     void clear() { faults_.clear(); }
     /// Takes all faults of this kind out; how many there were.
     std::size_t clear(FaultKind kind);
     const std::vector<Fault>& faults() const { return faults_; }
+    const FaultReach& reach() const { return reach_; }
 
     SensorState sensor_state(std::size_t channel, double time_s) const;
     bool frozen(std::uint8_t unit, double time_s) const;
@@ -68,6 +81,7 @@ class FaultPlan {
 
   private:
     std::vector<Fault> faults_;
+    FaultReach reach_;
 };
 
 }  // namespace thermbal
