@@ -189,6 +189,13 @@ int run_compare(const CompareOptions& options) {
     }
     auto input = read_input(options.recording);
     if (!input) return report_error(input.error());
+    if (const double length_min = (input->window.end_s() - input->window.start_s) / 60.0;
+        options.recording.every_min > length_min) {
+        return report_error({NextStep::refuse_input,
+                             fmt::format("--every-min {}: there are {:.1f} min of the recording, which is no "
+                                         "window; give less",
+                                         options.recording.every_min, length_min)});
+    }
     auto estimators = chosen_estimators(options, input->flow.prior.has_value());
     if (!estimators) return report_error(estimators.error());
     std::optional<Progress> progress("compare");

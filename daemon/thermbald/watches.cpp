@@ -48,9 +48,11 @@ void Daemon::watch_modules(Scan& scan) {
         }
         event(
             "frozen",
-            fmt::format("unit {}: it answers, but no word of it has changed from scan {} to {}: its samples "
-                        "are stuck until one does; switch the module off and on",
-                        module.name, change.first_scan, scan.scan));
+            fmt::format(
+                "unit {}: it answers, but no word of it has changed from scan {} to {}: its samples "
+                "are stuck until one does; switch the module off and on, or raise its frozen_after_min where "
+                "nothing has moved by a step of it for so long",
+                module.name, change.first_scan, scan.scan));
         if (is_measuring(test_.state)) take_back(module, change.first_scan, scan.scan - 1);
     }
 }

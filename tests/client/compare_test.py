@@ -179,6 +179,7 @@ class Compare(unittest.TestCase):
         for arguments, message in ((["--estimator", "guess"], "no estimator guess; there are svr, one_exponential"),
                                    (["--estimator", "modes_with_archive"], "needs earlier tests"),
                                    (["--plot", "x.png"], "ends in .html or .svg"),
+                                   (["--every-min", "5000"], "which is no window; give less"),
                                    (["--channel", "T9"], "no column T9")):
             self.assertIn(message, run(self.csv, *arguments, status=2).stderr)
 
