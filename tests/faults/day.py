@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """A day with everything that goes wrong: thermbald and thermbal-sim as they are shipped, a random mixture of all faults
 from a scenario file, time running so many times as fast. Every value that is stored as good is the word that the module
 measured during that scan, no scan is missing or more than a period late, and the scans between two faults are whole.

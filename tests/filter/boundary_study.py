@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """How the newest samples of a warm-up fare at the end of the window under different ways of going on beyond it: the
 measurement behind DenoiseOptions' defaults (core/filter/README.md). Prints mC: bias and standard deviation of the last
 1, 5 and 20 samples, root mean square over the window, bias of the first 5 samples.

@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """Every claim of systemd/SECURITY.md of what cannot be done names a test, and every test that it names is there.
 
     THERMBAL_SOURCE_DIR=. tests/release/claims.py

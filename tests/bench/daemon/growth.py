@@ -1,8 +1,9 @@
+#!/usr/bin/python3
 """How the daemon grows with channels, scan period, length of the test and stored tests: thermbald and thermbal-sim over Modbus TCP
 on loopback. Time runs so much faster that a scan is due each 200 ms; lateness is real milliseconds, CPU is user and system time. A
 long test is one that was stored (stored_scans.py) and is taken up again.
 
-  THERMBAL_BIN_DIR=build/bin THERMBAL_SOURCE_DIR=. python3 tests/bench/daemon/growth.py [--only channels] [--json FILE]"""
+  THERMBAL_BIN_DIR=build/bin THERMBAL_SOURCE_DIR=. tests/bench/daemon/growth.py [--only channels] [--json FILE]"""
 import argparse
 import contextlib
 import dataclasses

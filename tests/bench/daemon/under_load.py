@@ -1,7 +1,8 @@
+#!/usr/bin/python3
 """thermbald while it identifies without a pause: how late scans start against their grid, CPU per scan, memory, how long an
 identification takes. Time runs --scale times as fast, so that 400 min of test take minutes; lateness is real milliseconds.
 
-  THERMBAL_BIN_DIR=build/bin THERMBAL_SOURCE_DIR=. python3 tests/bench/daemon/under_load.py [--scans 2000] [--scale 60]
+  THERMBAL_BIN_DIR=build/bin THERMBAL_SOURCE_DIR=. tests/bench/daemon/under_load.py [--scans 2000] [--scale 60]
       [--channels 16] [--period-s 15] [--sweep always|needed|none]"""
 import argparse
 import pathlib
