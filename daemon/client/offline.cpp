@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <set>
 #include <string_view>
 #include <tuple>
@@ -57,33 +58,38 @@ std::string table_text(const OfflineOptions& options, const std::vector<ChannelV
 
 /// What a recording leaves for the archive.
 struct Lesson {
+    std::string file;
     ArchivedSpectrum spectrum;
     double length_min = 0.0;
 };
 
-/// The guard that says of this channel that its end is not known yet; nullptr where it is, or where the
-/// sensor is broken. Of the newest samples and the room nothing is asked: they matter to a declaration, not
-/// to a lesson.
-const Guard* not_known_yet(const ChannelVerdict& verdict) {
-    constexpr std::array<std::string_view, 3> of_the_end{"interval_within_tolerance",
-                                                         "slowest_seen_long_enough", "most_of_the_rise_seen"};
-    const auto failed = std::ranges::find_if(verdict.guards, [&](const Guard& guard) {
-        return !guard.passed && std::ranges::find(of_the_end, guard.name) != of_the_end.end();
-    });
-    return failed == verdict.guards.end() ? nullptr : &*failed;
+/// Which of these guards a channel does not pass, with the channel's name; nothing where all do, or its
+/// sensor is broken.
+template <std::size_t Count>
+std::optional<std::string> first_failing(const std::vector<ChannelVerdict>& channels,
+                                         const std::array<std::string_view, Count>& asked) {
+    for (const ChannelVerdict& channel : channels) {
+        for (const Guard& guard : channel.guards) {
+            if (!guard.passed && std::ranges::find(asked, guard.name) != asked.end())
+                return fmt::format("{} is not known yet ({})", channel.channel, guard.figures);
+        }
+    }
+    return std::nullopt;
 }
 
 /// A recording teaches what it knows at its end: an unsettled one would teach a guess, and later tests would
-/// be declared on it.
-Result<Lesson> lesson_of(const std::string& file, const std::string& ambient) {
-    OfflineOptions options;
-    options.file = file;
-    options.ambient = ambient;
-    options.modes_only = true;
-    const auto input = read_input(options);
-    if (!input) return std::unexpected(input.error());
-    auto verdict =
-        LiveFlow(input->flow).identify(input->window, {}, parallel_on_threads(1, false), not_cancelled);
+/// be declared on it. It knows its end where each channel passes what a declaration asks of the end; or where
+/// it went on until nothing slow was left to come: an interval that is still wide is the room's doing then.
+/// Of the newest samples and the room nothing is asked: they matter to a declaration, not to a lesson.
+Result<Lesson> lesson_of(const std::string& file, const OfflineInput& input) {
+    constexpr std::array<std::string_view, 3> of_the_end{"interval_within_tolerance",
+                                                         "slowest_seen_long_enough", "most_of_the_rise_seen"};
+    constexpr std::array<std::string_view, 2> of_the_slow{"slowest_seen_long_enough",
+                                                          "most_of_the_rise_seen"};
+    const auto identified = [&](const FlowOptions& flow) {
+        return LiveFlow(flow).identify(input.window, {}, parallel_on_threads(1, false), not_cancelled);
+    };
+    auto verdict = identified(input.flow);
     if (!verdict) return std::unexpected(verdict.error());
     if (!verdict->spectrum) {
         return fail(
@@ -92,16 +98,20 @@ Result<Lesson> lesson_of(const std::string& file, const std::string& ambient) {
                         "one regime, measured until it has settled",
                         file));
     }
-    for (const ChannelVerdict& channel : verdict->channels) {
-        const Guard* const unknown = not_known_yet(channel);
-        if (unknown == nullptr) continue;
-        return fail(
-            NextStep::refuse_input,
-            fmt::format("{}: ends at {:.0f} min, where {} is not known yet ({}); only a recording that has "
-                        "settled teaches. Measure on; thermbalctl identify says how far each channel is",
-                        file, verdict->window_end_min, channel.channel, unknown->figures));
+    if (const auto unknown = first_failing(verdict->channels, of_the_end)) {
+        FlowOptions measured_out = input.flow;
+        measured_out.guards.slow_time_constants = 2.0;
+        measured_out.guards.share_of_rise = 0.8;
+        const auto again = identified(measured_out);
+        if (!again) return std::unexpected(again.error());
+        if (first_failing(again->channels, of_the_slow)) {
+            return fail(NextStep::refuse_input,
+                        fmt::format("{}: ends at {:.0f} min, where {}; only a recording that has settled "
+                                    "teaches. Measure on; thermbalctl identify says how far each channel is",
+                                    file, verdict->window_end_min, *unknown));
+        }
     }
-    return Lesson{std::move(*verdict->spectrum), verdict->window_end_min};
+    return Lesson{file, std::move(*verdict->spectrum), verdict->window_end_min};
 }
 
 }  // namespace
@@ -142,27 +152,43 @@ int run_identify(const OfflineOptions& options) {
 }
 
 int run_learn(const LearnOptions& options) {
-    std::vector<Lesson> lessons;
+    std::vector<OfflineInput> inputs;
     for (const std::string& file : options.files) {
-        auto lesson = lesson_of(file, options.ambient);
-        if (!lesson) return report_error(lesson.error());
-        lessons.push_back(std::move(*lesson));
+        OfflineOptions of_file;
+        of_file.file = file;
+        of_file.ambient = options.ambient;
+        of_file.modes_only = true;
+        auto input = read_input(of_file);
+        if (!input) return report_error(input.error());
+        inputs.push_back(std::move(*input));
     }
+    std::vector<Lesson> lessons;
+    std::vector<Error> refused;
+    for (std::size_t i = 0; i < inputs.size(); ++i) {
+        auto lesson = lesson_of(options.files[i], inputs[i]);
+        if (lesson) {
+            lessons.push_back(std::move(*lesson));
+        } else {
+            refused.push_back(lesson.error());
+        }
+    }
+    if (lessons.empty()) return report_error(refused.front());
     auto store = Store::open(options.archive, {options.now_wall_ns, 0});
     if (!store) return report_error(store.error());
     std::string text;
-    for (std::size_t i = 0; i < lessons.size(); ++i) {
-        const auto id =
-            store->record_archive({.id = 0,
-                                   .machine = options.machine,
-                                   .test_id = {},
-                                   .created_wall_ns = options.now_wall_ns,
-                                   .spectrum_json = spectrum_to_json(lessons[i].spectrum).dump()});
+    for (const Lesson& lesson : lessons) {
+        const auto id = store->record_archive({.id = 0,
+                                               .machine = options.machine,
+                                               .test_id = {},
+                                               .created_wall_ns = options.now_wall_ns,
+                                               .spectrum_json = spectrum_to_json(lesson.spectrum).dump()});
         if (!id) return report_error(id.error());
-        text += fmt::format("{}: {:.0f} min of {} are in {}\n", options.files[i], lessons[i].length_min,
+        text += fmt::format("{}: {:.0f} min of {} are in {}\n", lesson.file, lesson.length_min,
                             options.machine.empty() ? "a machine without name" : options.machine,
                             options.archive);
     }
+    // The archive has what it could get; what it did not get is said all the same.
+    for (const Error& error : refused) std::ignore = report_error(error);
     return print_text(text);
 }
 

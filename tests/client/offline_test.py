@@ -1,6 +1,7 @@
 """The offline commands on small recordings: what they refuse, and what becomes of an answer that nobody takes."""
 import json
 import os
+import random
 import shlex
 import subprocess
 import tempfile
@@ -100,12 +101,29 @@ class Offline(unittest.TestCase):
         settled = self.settled()
         early = self.file("early.csv", "".join(settled.read_text().splitlines(keepends=True)[:25]))
         archive = Path(self.folder.name) / "archive.db"
-        made = run("thermbalctl", "learn", settled, early, "--archive", archive)
+        made = run("thermbalctl", "learn", early, "--archive", archive)
         self.refused(made, "early.csv: ends at 23 min, where T")
+        self.assertFalse(archive.exists(), "an archive of nothing")
+        self.refused(run("thermbalctl", "learn", settled, "gone.csv", "--archive", archive), "gone.csv")
         self.assertFalse(archive.exists(), "half of it was learned")
-        made = run("thermbalctl", "learn", settled, "--archive", archive, "--machine", "M")
-        self.assertEqual((made.returncode, made.stderr), (0, ""))
+        made = run("thermbalctl", "learn", early, settled, "--archive", archive, "--machine", "M")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        self.assertIn("early.csv: ends at 23 min, where T", made.stderr)
         self.assertIn("199 min of M are in", made.stdout)
+        self.assertNotIn("early.csv", made.stdout)
+
+    def test_a_recording_that_was_measured_out_teaches_however_its_channels_wander(self):
+        drawn, wander, rows = random.Random(3), [0.0, 0.0], ""
+        for k in range(400):
+            wander = [0.95 * off_C + drawn.gauss(0.0, 0.4) for off_C in wander]
+            rows += f"{60 * k},18.0,{28 - 10 * 0.95 ** k + wander[0]:.1f},{23 - 5 * 0.97 ** k + wander[1]:.1f}\n"
+        recording = self.file("wandering.csv", "time_s,T1,T2,T3\n" + rows)
+        said = json.loads(run("thermbalctl", "identify", recording, "--modes-only", "--json").stdout)
+        wide = [channel["channel"] for channel in said["channels"] for guard in channel["guards"]
+                if guard["name"] == "interval_within_tolerance" and not guard["passed"]]
+        self.assertTrue(wide, "no interval is wide: this recording tests nothing")
+        made = run("thermbalctl", "learn", recording, "--archive", Path(self.folder.name) / "archive.db")
+        self.assertEqual((made.returncode, made.stderr), (0, ""))
 
 
 class Asked(DaemonCase):

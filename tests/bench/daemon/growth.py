@@ -51,6 +51,7 @@ CASES = ([Case("channels", channels=count) for count in (16, 64, 256, 1024)]
          + [Case("period", period_s=period_s) for period_s in (5.0, 1.0)]
          + [Case("window", period_s=period_s, stored_min=minutes) for period_s in (15.0, 1.0)
             for minutes in (400.0, 7 * 1440.0)]
+         + [Case("channels and window", channels=count, stored_min=400.0) for count in (256, 1024)]
          + [Case("tests", stored_tests=count) for count in (1, 100, 1000, 10000)])
 
 
