@@ -27,11 +27,12 @@ inline void keep_standard_streams() {
 
 /// All of it, or an error (stop) that says why not. Once something was lost, every later call says so.
 inline Result<void> print_out(std::string_view text) {
-    errno = 0;
-    const bool taken = std::fwrite(text.data(), 1, text.size(), stdout) == text.size();
-    if (std::fflush(stdout) == 0 && taken && std::ferror(stdout) == 0) return {};
-    const std::string why = errno == 0 ? "not all of it was taken" : errno_text(errno);
-    return fail(NextStep::stop, "standard output: " + why);
+    int mistake = 0;
+    if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size()) mistake = errno;
+    if (std::fflush(stdout) != 0) mistake = errno;
+    if (mistake == 0 && std::ferror(stdout) == 0) return {};
+    return fail(NextStep::stop,
+                "standard output: " + (mistake == 0 ? "not all of it was taken" : errno_text(mistake)));
 }
 
 /// Where nothing takes it there is nobody to tell.
