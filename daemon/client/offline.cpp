@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <set>
+#include <span>
 #include <string_view>
 #include <tuple>
 
@@ -65,9 +66,8 @@ struct Lesson {
 
 /// Which of these guards a channel does not pass, with the channel's name; nothing where all do, or its
 /// sensor is broken.
-template <std::size_t Count>
 std::optional<std::string> first_failing(const std::vector<ChannelVerdict>& channels,
-                                         const std::array<std::string_view, Count>& asked) {
+                                         std::span<const std::string_view> asked) {
     for (const ChannelVerdict& channel : channels) {
         for (const Guard& guard : channel.guards) {
             if (!guard.passed && std::ranges::find(asked, guard.name) != asked.end())
@@ -84,8 +84,6 @@ std::optional<std::string> first_failing(const std::vector<ChannelVerdict>& chan
 Result<Lesson> lesson_of(const std::string& file, const OfflineInput& input) {
     constexpr std::array<std::string_view, 3> of_the_end{"interval_within_tolerance",
                                                          "slowest_seen_long_enough", "most_of_the_rise_seen"};
-    constexpr std::array<std::string_view, 2> of_the_slow{"slowest_seen_long_enough",
-                                                          "most_of_the_rise_seen"};
     const auto identified = [&](const FlowOptions& flow) {
         return LiveFlow(flow).identify(input.window, {}, parallel_on_threads(1, false), not_cancelled);
     };
@@ -104,7 +102,7 @@ Result<Lesson> lesson_of(const std::string& file, const OfflineInput& input) {
         measured_out.guards.share_of_rise = 0.8;
         const auto again = identified(measured_out);
         if (!again) return std::unexpected(again.error());
-        if (first_failing(again->channels, of_the_slow)) {
+        if (first_failing(again->channels, std::span(of_the_end).subspan(1))) {
             return fail(NextStep::refuse_input,
                         fmt::format("{}: ends at {:.0f} min, where {}; only a recording that has settled "
                                     "teaches. Measure on; thermbalctl identify says how far each channel is",

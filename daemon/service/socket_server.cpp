@@ -94,7 +94,8 @@ Result<std::set<std::string, std::less<>>> topics_in(const json& params,
         return fail(NextStep::refuse_input,
                     fmt::format("subscribe: topics must be a list of 1 to {} names", most_topics));
     for (const auto& topic : *list) topics.insert(topic.get<std::string>());
-    const auto unknown = std::ranges::find_if(topics, [&](const auto& topic) { return !known.contains(topic); });
+    const auto unknown =
+        std::ranges::find_if(topics, [&](const auto& topic) { return !known.contains(topic); });
     if (unknown != topics.end()) {
         return fail(NextStep::refuse_input,
                     fmt::format("subscribe: no such topic; there are: {}", fmt::join(known, ", ")));

@@ -109,9 +109,9 @@ Result<Station> station(const SimulatorOptions& options) {
         options.lockstep_s
             ? SimClock::lockstep(*options.lockstep_s)
             : SimClock::scaled(options.time_scale, options.time_epoch_ns.value_or(monotonic_ns()));
-    return Station(ModbusModule(options.map, options.units), std::move(*source), FaultPlan(options.faults, options.fault_reach()),
-                   clock, options.foreign_unit, {.on_read = std::move(*log), .on_write = print_write},
-                   options.noise.seed);
+    return Station(ModbusModule(options.map, options.units), std::move(*source),
+                   FaultPlan(options.faults, options.fault_reach()), clock, options.foreign_unit,
+                   {.on_read = std::move(*log), .on_write = print_write}, options.noise.seed);
 }
 
 Result<void> announce(std::string_view event, const std::string& what) {

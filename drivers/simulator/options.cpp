@@ -327,8 +327,8 @@ int answered(int status) {
 
 FaultReach SimulatorOptions::fault_reach() const {
     if (task != SimulatorTask::serve_tcp && task != SimulatorTask::serve_rtu) return {};
-    FaultReach reach{
-        .framing = task == SimulatorTask::serve_rtu ? FaultFraming::rtu : FaultFraming::tcp, .channels = 0};
+    FaultReach reach{.framing = task == SimulatorTask::serve_rtu ? FaultFraming::rtu : FaultFraming::tcp,
+                     .channels = 0};
     for (const ModuleUnit& unit : units) {
         reach.units.push_back(unit.id);
         reach.channels = std::max(reach.channels, unit.first_channel + unit.channels);
