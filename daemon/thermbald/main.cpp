@@ -78,8 +78,8 @@ void leave_signals_to_the_loop() {
 /// wait for each other, and a scan would wait for a computation that the host keeps from running.
 void give_memory_back(const Config& config) {
     const auto threads = static_cast<int>(config.lines.size()) + config.identification.workers + 5;
-    mallopt(M_ARENA_MAX, threads);
-    mallopt(M_TRIM_THRESHOLD, 64 * 1024);
+    mallopt(M_ARENA_MAX, threads);         // NOLINT(concurrency-mt-unsafe): no other thread yet
+    mallopt(M_TRIM_THRESHOLD, 64 * 1024);  // NOLINT(concurrency-mt-unsafe)
 }
 
 /// That the machine can be stopped is seen to before it runs for hours.
