@@ -149,19 +149,19 @@ void DualSolver::newton_direction() {
 }
 
 void DualSolver::pick_bending() {
-    constexpr std::size_t height = PanelMatrix::height;
+    constexpr std::size_t panel_height = PanelMatrix::height;
     const std::size_t count = bending_.size();
     system_.resize_lower(count);
     for (std::size_t p = 0; p < system_.panels(); ++p) {
-        const std::size_t first = p * height;
-        std::array<Index, height> rows{};
-        for (std::size_t lane = 0; lane < height; ++lane) {
+        const std::size_t first = p * panel_height;
+        std::array<Index, panel_height> rows{};
+        for (std::size_t lane = 0; lane < panel_height; ++lane) {
             rows[lane] = bending_[std::min(first + lane, count - 1)];
         }
-        for (std::size_t j = 0; j < std::min(first + height, count); ++j) {
+        for (std::size_t j = 0; j < std::min(first + panel_height, count); ++j) {
             const double* const column = kernel_->by_row.col(bending_[j]).data();
             double* const eight = system_.eight(p, j);
-            for (std::size_t lane = 0; lane < height; ++lane) eight[lane] = column[rows[lane]];
+            for (std::size_t lane = 0; lane < panel_height; ++lane) eight[lane] = column[rows[lane]];
         }
     }
     for (std::size_t i = count; i < system_.padded_rows(); ++i) {
