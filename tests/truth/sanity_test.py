@@ -269,7 +269,7 @@ def files():
                     "--runs",
                     "2",
                     "--seed",
-                    "8",
+                    "10",
                     "--group",
                     "modes_2",
                     "--group",
