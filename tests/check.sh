@@ -48,7 +48,7 @@ while [ $# -gt 0 ]; do
             # The rooms that bytes from outside reach, in the build of the fuzz targets: it has both sanitizers.
             tests=(series config store store_kill service acquisition simulator)
             build fuzz "${tests[@]/%/_test}"
-            printf '%s\n' "${tests[@]}" | xargs -P 2 -I{} build/fuzz/tests/{}_test --gtest_brief=1
+            printf '%s\n' "${tests[@]}" | xargs -P 2 -I{} env build/fuzz/tests/{}_test --gtest_brief=1
             ;;
         tsan)
             build tsan acquisition_test compute_test
