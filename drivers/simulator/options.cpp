@@ -263,8 +263,9 @@ Result<void> take_faults(const Flags& flags, SimulatorOptions& options) {
         if (!scenario) return std::unexpected(scenario.error());
         options.faults.insert(options.faults.end(), scenario->begin(), scenario->end());
     }
+    const FaultReach reach = options.fault_reach();
     for (const Fault& fault : options.faults) {
-        if (auto acts = check_reach(fault, options.fault_reach()); !acts) return acts;
+        if (auto acts = check_reach(fault, reach); !acts) return acts;
     }
     options.control_path = flags.control_path;
     return check_lockstep(flags, options.faults);

@@ -4,6 +4,8 @@ import pathlib
 import re
 import sys
 
+from outcome import conclude
+
 SOURCE = pathlib.Path(os.environ["THERMBAL_SOURCE_DIR"])
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.M)
 
@@ -43,10 +45,7 @@ def main():
                 for what, pattern in NOT_IN_CORE.items():
                     if pattern.search(text):
                         wrong.append(f"{where}: {what} has no place in core")
-    if seen < 30:
-        wrong.append(f"only {seen} sources looked at: the test looks in the wrong place")
-    print("\n".join(wrong) or f"{seen} sources keep to the directions")
-    return 1 if wrong else 0
+    return conclude(wrong, seen, 30, "sources keep to the directions")
 
 
 if __name__ == "__main__":

@@ -5,6 +5,8 @@ import pathlib
 import re
 import sys
 
+from outcome import conclude
+
 SOURCE = pathlib.Path(os.environ["THERMBAL_SOURCE_DIR"])
 TYPE = re.compile(r"^(?:struct|class|enum class) (\w+)(?: final)?(?: : [^{;]+)? \{", re.M)
 # Rooms that no program has together.
@@ -25,10 +27,7 @@ def main():
                 rooms_of.setdefault(name, set()).add(room_of(path))
     wrong = [f"{name}: in {' and '.join(sorted(rooms))}" for name, rooms in sorted(rooms_of.items())
              if len(rooms) > 1 and name not in HARMLESS and tuple(sorted(rooms)) not in NEVER_TOGETHER]
-    if len(rooms_of) < 200:
-        wrong.append(f"only {len(rooms_of)} types seen: the test looks in the wrong place")
-    print("\n".join(wrong) or f"{len(rooms_of)} types, each with a name of its own")
-    return 1 if wrong else 0
+    return conclude(wrong, len(rooms_of), 200, "types, each with a name of its own")
 
 
 if __name__ == "__main__":
