@@ -1,4 +1,4 @@
-"""The daemon is held up and misses scans; the test ends meanwhile. The next test knows nothing of it."""
+"""What the daemon says of itself is its own: trouble of an ended test is not the next one's, memory of who started it not its."""
 import signal
 import time
 
@@ -29,5 +29,16 @@ def the_next_test_begins_on_time():
         assert kinds(folder, second)[:1] != ["on_time"], "it had no trouble that could be over"
 
 
+def memory_of_who_started_it_is_not_told_as_its_own():
+    large = bytearray(300_000_000)
+    with scratch() as folder, Simulator("--time-scale", SCALE) as sim:
+        config = configuration(folder, {"transport": "tcp", "host": "127.0.0.1", "port": sim.port},
+                               identification={"every_s": 3600.0})
+        with Daemon(folder, config, "--time-scale", SCALE) as daemon:
+            daemon.wait_for("status", lambda s: s["test"] and s["test"]["scans"] > 2, "some scans")
+            highest = daemon.call("health")["max_rss_bytes"]
+    assert 5e6 < highest < 0.5 * len(large), highest
+
+
 if __name__ == "__main__":
-    run([the_next_test_begins_on_time])
+    run([the_next_test_begins_on_time, memory_of_who_started_it_is_not_told_as_its_own])
