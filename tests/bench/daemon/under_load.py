@@ -10,7 +10,7 @@ import sys
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent.parent / "daemon"))
-from daemon_support import Daemon, Simulator, configuration, scratch  # noqa: E402
+from daemon_support import Daemon, Simulator, configuration, database, scratch  # noqa: E402
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("--scans", type=int, default=2000)
@@ -51,4 +51,10 @@ with scratch() as folder, Simulator("--time-scale", str(args.scale), "--units", 
     row("identifications, p50 / max, real s", f"{health['identification_s']['count']}, "
         f"{health['identification_s']['p50']:.2f} / {health['identification_s']['max']:.2f}")
     row("age of the identification, scans", f"{status['test'].get('identification_age_s')} s of test")
+    line_of_daemon, commit = health["lines"][0], health["commit_ms"]
+    row("line: timeouts / reconnects", f"{line_of_daemon['timeouts']} / {line_of_daemon['reconnects']}")
+    row("commit p50 / p99.9 / max, ms", " / ".join(f"{commit[key]:.3f}" for key in ("p50", "p999", "max")))
+    with database(folder) as stored:
+        for kind, message in stored.execute("SELECT kind, message FROM events WHERE kind IN ('scans_late', 'scans_missed')"):
+            row(kind, message)
     row("real time, s", f"{time.monotonic() - started:.0f}")
