@@ -13,9 +13,6 @@ import statistics
 
 import scoring
 
-STRONG = 12
-LOWEST = -1.0  # as Score.holdout_gap counts a gap that has grown
-
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -24,34 +21,23 @@ def arguments():
     return parser.parse_args()
 
 
-def pairs(sets):
+def score(sets):
+    pairs = []
     for one in sets:
         truth, results = map(pathlib.Path, one.split(":"))
-        for name, known in json.loads(truth.read_text()).items():
-            kept = results / f"{name}.json"
-            answer = json.loads(kept.read_text()) if kept.exists() else {}
-            if answer.get("gap", {}).get("holdout_before_rmse_C") is not None:
-                yield answer, known
-
-
-def before_above_floor_C(answer, truth):
-    return answer["gap"]["holdout_before_rmse_C"] - truth["holdout_floor_C"]
+        pairs += [(json.loads(kept.read_text()), known) for name, known in json.loads(truth.read_text()).items()
+                  if (kept := results / f"{name}.json").exists()]
+    return scoring.Score(pairs)
 
 
 def main():
     given = arguments()
-    missed_C = [before_above_floor_C(a, t) for a, t in pairs(given.free) if not t["effects"]]
+    missed_C = [gap_C for a, t in score(given.free).none if (gap_C := scoring.holdout_gap_C(a, t)) is not None]
     print(f"{len(missed_C)} runs in which nothing is missing: held-out gap above the floor, mean {statistics.mean(missed_C):.4f} C, "
           f"median {statistics.median(missed_C):.4f}, nine in ten below {sorted(missed_C)[int(0.9 * len(missed_C))]:.4f}")
-    closed, reachable = [], []
-    for answer, truth in pairs(given.cases):
-        in_catalogue = truth["effects"] and all(e["inside_catalogue"] for e in truth["effects"])
-        share = scoring.gap_closed(answer, truth) if in_catalogue and truth["strength"] >= STRONG else None
-        if share is None:
-            continue
-        gap_C = before_above_floor_C(answer, truth)
-        closed.append(max(share, LOWEST))
-        reachable.append(statistics.mean(max(1 - missed / gap_C, LOWEST) for missed in missed_C))
+    cases = score(given.cases).with_holdout_gap()
+    closed = [share for share, _ in cases]
+    reachable = [statistics.mean(scoring.counted(1 - missed / gap_C) for missed in missed_C) for _, gap_C in cases]
     for what, shares in (("closed", closed), ("with what is missed where nothing is missing", reachable)):
         print(f"{what}: {len(shares)} cases, mean {statistics.mean(shares):.3f}, median {statistics.median(shares):.3f}")
 

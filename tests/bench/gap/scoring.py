@@ -38,12 +38,22 @@ def onset_is_right(effect, truth):
     return "onset_s" not in truth or abs(effect["from_s"] - truth["onset_s"]) <= ONSET_TOLERANCE_S
 
 
+def holdout_gap_C(answer, truth):
+    """Of the calibrated model, above the floor; None without a held-out run."""
+    before = answer.get("gap", {}).get("holdout_before_rmse_C")
+    return None if before is None else before - truth["holdout_floor_C"]
+
+
+def counted(share_closed):
+    """In a mean a gap that has grown counts for no more than -1."""
+    return max(share_closed, -1.0)
+
+
 def gap_closed(answer, truth):
-    gap, floor = answer["gap"], truth["holdout_floor_C"]
-    before, after = gap.get("holdout_before_rmse_C"), gap.get("holdout_after_rmse_C")
-    if before is None or before - floor < 0.25 * floor:
+    gap_C, floor = holdout_gap_C(answer, truth), truth["holdout_floor_C"]
+    if gap_C is None or gap_C < 0.25 * floor:
         return None  # nothing to close
-    return 1 - (after - floor) / (before - floor)
+    return 1 - (answer["gap"]["holdout_after_rmse_C"] - floor) / gap_C
 
 
 def parameter_error(effect, truth):
@@ -96,10 +106,14 @@ class Score:
     def places(self):
         return share(place_is_right(e, t) and onset_is_right(e, t) for e, t in self._right())
 
+    def with_holdout_gap(self):
+        """(share closed as it counts, gap in C), a strong case each that has something to close."""
+        strong = [(a, t) for a, t in self.single + self.double if t["strength"] >= 12]
+        return [(counted(share), holdout_gap_C(a, t)) for a, t in strong if (share := gap_closed(a, t)) is not None]
+
     def holdout_gap(self):
-        closed = [gap_closed(a, t) for a, t in self.single + self.double if t["strength"] >= 12 and "gap" in a]
-        closed = [c for c in closed if c is not None]
-        return (statistics.mean(max(c, -1.0) for c in closed) if closed else math.nan), len(closed)
+        closed = [share for share, _ in self.with_holdout_gap()]
+        return (statistics.mean(closed) if closed else math.nan), len(closed)
 
     def both_of_pair(self):
         return share({e["kind"] for e in t["effects"]} <= {e["kind"] for e in named(a)} for a, t in self.double)
