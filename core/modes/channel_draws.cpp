@@ -56,19 +56,6 @@ Eigen::MatrixXd mode_curves(const std::vector<Mode>& modes, const ModePrior& pri
     return step_columns(tau, minute);
 }
 
-/// Columns of everything that is linear whatever the modes: the basis, then the archived responses.
-Eigen::MatrixXd linear_curves(const SpectrumProblem& problem, const Eigen::MatrixXd& responses,
-                              const CurveGrid& curves) {
-    const Basis& basis = problem.basis;
-    Eigen::MatrixXd linear(curves.design.rows(), basis.size() + responses.cols());
-    linear.leftCols(basis.size()) = curves.design;
-    if (responses.cols() == 0) return linear;
-    linear.rightCols(responses.cols()) =
-        curves.design.middleCols(1, basis.grid()) * responses.topRows(basis.grid()) +
-        curves.fine * responses.bottomRows(curves.fine.cols());
-    return linear;
-}
-
 }  // namespace
 
 Eigen::MatrixXd step_columns(const std::vector<double>& time_constant_min,
@@ -145,6 +132,22 @@ double ChannelDraws::half_width_of_90_percent() const {
     return 0.5 * (mixture_quantile(*this, 0.95) - mixture_quantile(*this, 0.05));
 }
 
+Eigen::VectorXd background_curve(const BackgroundAmplitudes& amplitudes, const CurveGrid& curves) {
+    Eigen::VectorXd curve = curves.design * amplitudes.of_basis;
+    if (amplitudes.of_modes.size() > 0) curve += curves.fine * amplitudes.of_modes;
+    return curve;
+}
+
+BackgroundAmplitudes spread_responses(const ObservedChannel& channel, const Basis& basis,
+                                      const Eigen::VectorXd& background) {
+    BackgroundAmplitudes spread{background.head(basis.size()), {}};
+    if (channel.responses.cols() == 0) return spread;
+    const Eigen::VectorXd response = channel.responses * background.tail(channel.responses.cols());
+    spread.of_basis.segment(1, basis.grid()) += response.head(basis.grid());
+    spread.of_modes = response.tail(response.size() - basis.grid());
+    return spread;
+}
+
 SpectrumDraws draw_channels(const SpectrumProblem& problem, std::vector<ChannelModel>& models,
                             const std::vector<std::vector<Mode>>& states, const CurveGrid& curves,
                             std::uint64_t seed) {
@@ -155,8 +158,7 @@ SpectrumDraws draw_channels(const SpectrumProblem& problem, std::vector<ChannelM
     draws.log_variance = Eigen::VectorXd::Zero(grid);
     for (const ObservedChannel& channel : problem.channels) {
         ChannelDraws& each = draws.channels.emplace_back();
-        each.linear = linear_curves(problem, channel.responses, curves);
-        each.background = Eigen::VectorXd::Zero(each.linear.cols());
+        each.background = Eigen::VectorXd::Zero(problem.basis.size() + channel.responses.cols());
         each.fine = Eigen::VectorXd::Zero(grid);
     }
     const double share = 1.0 / static_cast<double>(states.size());
@@ -185,9 +187,11 @@ SpectrumDraws draw_channels(const SpectrumProblem& problem, std::vector<ChannelM
             add_on_grid(modes, model.mean_modes(), share, channel.fine);
             if (!with_curve) continue;
             const Eigen::VectorXd sample = model.draw(random);
-            const Eigen::Index linear = channel.linear.cols();
-            const Eigen::VectorXd curve = channel.linear * sample.head(linear) + steps * sample.tail(count);
             const ObservedChannel& observed = problem.channels[k];
+            const Eigen::VectorXd curve =
+                background_curve(
+                    spread_responses(observed, problem.basis, sample.head(sample.size() - count)), curves) +
+                steps * sample.tail(count);
             const double start = std::isnan(observed.test_start_C)
                                      ? sample[0]
                                      : observed.test_start_C - observed.data.centre_C;

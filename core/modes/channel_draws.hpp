@@ -34,7 +34,6 @@ struct ChannelDraws {
     std::vector<double> variance;
     Eigen::VectorXd background;           ///< posterior mean: basis, then archived responses
     Eigen::VectorXd fine;                 ///< posterior mean amplitudes on the modes' grid
-    Eigen::MatrixXd linear;               ///< curves of `background`, a row a minute of the grid
     std::vector<double> equilibrium_min;  ///< since the start of the test
 
     /// Mean and standard deviation of the mixture; half of the width between its 5 % and 95 % quantiles.
@@ -42,6 +41,19 @@ struct ChannelDraws {
     double standard_deviation() const;
     double half_width_of_90_percent() const;
 };
+
+/// What is linear whatever the modes are, archived responses spread over the basis and the modes' grid.
+struct BackgroundAmplitudes {
+    Eigen::VectorXd of_basis;
+    Eigen::VectorXd of_modes;  ///< empty without archived responses
+};
+
+/// `background`: coefficients of the basis, then of the channel's archived responses.
+BackgroundAmplitudes spread_responses(const ObservedChannel& channel, const Basis& basis,
+                                      const Eigen::VectorXd& background);
+
+/// A value a minute of the grid.
+Eigen::VectorXd background_curve(const BackgroundAmplitudes& amplitudes, const CurveGrid& curves);
 
 /// What the states say of each channel, and of the modes themselves.
 struct SpectrumDraws {

@@ -11,6 +11,7 @@
 #include "base/units.hpp"
 #include "series/resolution.hpp"
 #include "series/sample.hpp"
+#include "unrounded_room.hpp"
 
 namespace thermbal {
 
@@ -172,8 +173,8 @@ AmbientInput ambient_input(const TestWindow& window, std::string_view ambient, d
         const auto count = static_cast<std::size_t>(std::lround(minutes * seconds_per_min / window.period_s));
         return std::clamp<std::size_t>(count, 1, window.scans);
     };
-    std::vector<double> values = column->values;
-    if (std::isnan(mean_of_good(values))) return input;
+    if (std::isnan(mean_of_good(column->values))) return input;
+    std::vector<double> values = unrounded_room(column->values, window.period_s).value_or(column->values);
     bridge_gaps(values);
     input.measured = true;
     input.reference_C = mean_of_good(std::span(values).first(scans_in(reference_minutes)));

@@ -35,17 +35,11 @@ double range_over_the_last_hour_C(const AmbientInput& room, double period_s) {
     return last.range_C();
 }
 
-/// Posterior mean coefficients as predict_curve wants them: archived responses spread over basis and modes.
-Eigen::VectorXd coefficients_of(const ObservedChannel& channel, const ChannelDraws& draws,
-                                const Basis& basis) {
-    Eigen::VectorXd coefficients(basis.size() + draws.fine.size());
-    coefficients << draws.background.head(basis.size()), draws.fine;
-    if (channel.responses.cols() > 0) {
-        const Eigen::VectorXd response = channel.responses * draws.background.tail(channel.responses.cols());
-        coefficients.segment(1, basis.grid()) += response.head(basis.grid());
-        coefficients.tail(draws.fine.size()) += response.tail(draws.fine.size());
-    }
-    coefficients[0] += channel.data.centre_C;
+/// Posterior mean coefficients as predict_curve wants them, but for the channel's centre.
+Eigen::VectorXd coefficients_of(const BackgroundAmplitudes& background, const Eigen::VectorXd& of_modes) {
+    Eigen::VectorXd coefficients(background.of_basis.size() + of_modes.size());
+    coefficients << background.of_basis, of_modes;
+    if (background.of_modes.size() > 0) coefficients.tail(of_modes.size()) += background.of_modes;
     return coefficients;
 }
 
@@ -105,8 +99,10 @@ ChannelEstimate channel_estimate(const SpectrumProblem& problem, const ObservedC
 
     const double settled = draws.steady_state();
     channel.steady_state_C = data.centre_C + settled;
-    const Eigen::VectorXd curve = draws.linear * draws.background + curves.fine * draws.fine;
-    const Eigen::VectorXd coefficients = coefficients_of(observed, draws, problem.basis);
+    const BackgroundAmplitudes background = spread_responses(observed, problem.basis, draws.background);
+    const Eigen::VectorXd curve = background_curve(background, curves) + curves.fine * draws.fine;
+    Eigen::VectorXd coefficients = coefficients_of(background, draws.fine);
+    coefficients[0] += data.centre_C;
     channel.coefficients.assign(coefficients.begin(), coefficients.end());
     channel.start_C = coefficients[0];
     channel.last_C = data.centre_C + curve[problem.design.rows()];
