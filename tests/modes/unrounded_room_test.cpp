@@ -32,6 +32,7 @@ std::vector<double> read_by(const std::vector<double>& temperature_C, double noi
     std::mt19937 random(seed);
     std::normal_distribution<double> noise;
     std::vector<double> readings;
+    readings.reserve(temperature_C.size());
     for (const double value : temperature_C)
         readings.push_back(step_C * std::round((value + noise_C * noise(random)) / step_C));
     return readings;
