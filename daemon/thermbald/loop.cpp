@@ -4,6 +4,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <malloc.h>
 #include <spdlog/spdlog.h>
 #include <sys/signalfd.h>
 
@@ -84,7 +85,10 @@ Daemon::Daemon(DaemonOptions options, Clock& clock, Store store, SocketServer se
                 options = job.options;
                 flow.emplace(*options);
             }
-            return flow->identify(job.window, job.settled, parallel, cancelled);
+            auto verdict = flow->identify(job.window, job.settled, parallel, cancelled);
+            // What a long window took lies in holes between what is kept: a heap gives back its end alone.
+            malloc_trim(0);
+            return verdict;
         },
         [this](IdentificationResult result) { identifications_.push(std::move(result)); });
     comparer_ = std::make_unique<Comparer>(
