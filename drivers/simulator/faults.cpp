@@ -1,6 +1,7 @@
 #include "simulator/faults.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <utility>
@@ -30,6 +31,14 @@ std::optional<double> seconds(std::string_view text) {
     const auto value = number<double>(text);
     if (!value || !std::isfinite(*value) || *value < 0.0) return std::nullopt;
     return value;
+}
+
+/// Read again it is the same number. Without an exponent, whose sign would part two times.
+std::string written(double seconds) {
+    std::array<char, 400> digits{};
+    const auto put =
+        std::to_chars(digits.data(), digits.data() + digits.size(), seconds, std::chars_format::fixed);
+    return {digits.data(), put.ptr};
 }
 
 /// Decimal, or hexadecimal after 0x.
@@ -155,8 +164,8 @@ std::string to_string(const Fault& fault) {
     if (!entry.value.name.empty()) text += fmt::format("={}", fault.value);
     if (fault.channel) text += fmt::format(":T{}", *fault.channel + 1);
     if (fault.unit) text += fmt::format(":{}", *fault.unit);
-    text += fmt::format("@{}", fault.from_s);
-    if (std::isfinite(fault.to_s)) text += fmt::format("-{}", fault.to_s);
+    text += "@" + written(fault.from_s);
+    if (std::isfinite(fault.to_s)) text += "-" + written(fault.to_s);
     return text;
 }
 

@@ -40,6 +40,18 @@ TEST(FaultText, KindValueTargetTimes) {
     EXPECT_FALSE(exception.active(900.0));
 }
 
+TEST(FaultText, WrittenAndReadAgainItIsTheSame) {
+    for (const char* text : {"open:T7@0.00001657856899-0.5", "silence@3600-100000000000000000000000"}) {
+        const auto fault = parse_fault(text);
+        ASSERT_TRUE(fault.has_value()) << text;
+        const auto again = parse_fault(to_string(*fault));
+        ASSERT_TRUE(again.has_value()) << to_string(*fault);
+        EXPECT_EQ(again->from_s, fault->from_s);
+        EXPECT_EQ(again->to_s, fault->to_s);
+    }
+    EXPECT_EQ(to_string(*parse_fault("open:T7@0.00001-0.5")), "open:T7@0.00001-0.5");
+}
+
 TEST(FaultText, WhatIsWrongIsRefusedAndNamed) {
     for (const char* text : {"",
                              "open",
