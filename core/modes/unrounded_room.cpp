@@ -29,27 +29,31 @@ constexpr std::size_t near_knots = 4;
 constexpr double most_unexplained = 0.1;
 constexpr double rounding_variance = 1.0 / 12.0;
 
-struct Likelihood {
-    double log = 0.0;
-    double slope = 0.0;
-    double curvature = 0.0;  ///< of minus the logarithm, not below 0
-};
-
-/// Of a reading `away` above the curve.
-Likelihood of_reading(double away, double noise) {
+/// That a reading lies `away` above the curve.
+double probability_of(double away, double noise) {
     // Some readings no curve explains: none pulls without bound.
     constexpr double unexplained = 1e-3;
+    const auto above = [](double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); };
+    return above((std::abs(away) - 0.5) / noise) - above((std::abs(away) + 0.5) / noise) + unexplained;
+}
+
+/// Of a logarithm of a probability, by the curve.
+struct Derivatives {
+    double slope = 0.0;
+    double curvature = 0.0;  ///< its negative, not below 0
+};
+
+Derivatives derivatives_of(double away, double noise) {
     const double side = away < 0.0 ? -1.0 : 1.0;
     const double near = (std::abs(away) - 0.5) / noise;
     const double far = (std::abs(away) + 0.5) / noise;
-    const auto above = [](double z) { return 0.5 * std::erfc(z / std::numbers::sqrt2); };
     const auto density = [](double z) {
         return std::exp(-0.5 * z * z) * std::numbers::inv_sqrtpi / std::numbers::sqrt2;
     };
-    const double probability = above(near) - above(far) + unexplained;
+    const double probability = probability_of(away, noise);
     const double first = side * (density(near) - density(far)) / (noise * probability);
     const double second = (near * density(near) - far * density(far)) / (noise * noise * probability);
-    return {std::log(probability), first, std::max(0.0, first * first - second)};
+    return {first, std::max(0.0, first * first - second)};
 }
 
 /// Where a scan lies between two knots.
@@ -85,9 +89,8 @@ class Drift {
 
     Eigen::VectorXd by_least_squares() const {
         const Eigen::VectorXd zero = Eigen::VectorXd::Zero(prior_.rows());
-        return newton_step(zero, [](double away) {
-            return Likelihood{0.0, away / rounding_variance, 1.0 / rounding_variance};
-        });
+        return newton_step(
+            zero, [](double away) { return Derivatives{away / rounding_variance, 1.0 / rounding_variance}; });
     }
 
     /// Newton's method from `level` on, which ends at the mode; the logarithm of the posterior there.
@@ -98,7 +101,7 @@ class Drift {
         double best = value(level, noise);
         for (int step = 0; step < most_steps; ++step) {
             const Eigen::VectorXd move =
-                newton_step(level, [noise](double away) { return of_reading(away, noise); });
+                newton_step(level, [noise](double away) { return derivatives_of(away, noise); });
             double length = 1.0;
             double reached = value(level + move, noise);
             while (!(reached > best) && length > shortest) {
@@ -124,19 +127,20 @@ class Drift {
     double value(const Eigen::VectorXd& level, double noise) const {
         double sum = -0.5 * level.dot(prior_ * level);
         for (std::size_t k = 0; k < readings_.size(); ++k) {
-            if (!std::isnan(readings_[k])) sum += of_reading(readings_[k] - place_of(k).at(level), noise).log;
+            if (!std::isnan(readings_[k]))
+                sum += std::log(probability_of(readings_[k] - place_of(k).at(level), noise));
         }
         return sum;
     }
 
     template <class OfReading>
-    Eigen::VectorXd newton_step(const Eigen::VectorXd& level, const OfReading& likelihood) const {
+    Eigen::VectorXd newton_step(const Eigen::VectorXd& level, const OfReading& derivatives) const {
         Eigen::VectorXd gradient = -(prior_ * level);
         Eigen::SparseMatrix<double> hessian = prior_;
         for (std::size_t k = 0; k < readings_.size(); ++k) {
             if (std::isnan(readings_[k])) continue;
             const Place place = place_of(k);
-            const Likelihood one = likelihood(readings_[k] - place.at(level));
+            const Derivatives one = derivatives(readings_[k] - place.at(level));
             const std::array<double, 2> weight = {1.0 - place.share, place.share};
             for (Eigen::Index i = 0; i < 2; ++i) {
                 const double of_knot = weight[static_cast<std::size_t>(i)];
@@ -168,19 +172,26 @@ bool noisy(const std::vector<double>& readings) {
     return squares > 2.0 * (0.25 + rounding_variance) * static_cast<double>(count);
 }
 
-/// A door or a thermostat moves the room faster than the curve bends: there readings stay what they are.
-bool mostly_explained_about(std::size_t scan, const std::vector<double>& readings,
-                            const std::vector<bool>& explained, std::size_t reach) {
-    if (!explained[scan]) return false;
-    std::size_t good = 0;
-    std::size_t missed = 0;
-    const std::size_t last = std::min(explained.size(), scan + reach + 1);
-    for (std::size_t k = scan - std::min(scan, reach); k < last; ++k) {
-        if (std::isnan(readings[k])) continue;
-        ++good;
-        if (!explained[k]) ++missed;
+/// Where no more than `most_unexplained` of the good readings up to `reach` scans away are unexplained. A
+/// door or a thermostat moves the room faster than the curve bends: there readings stay what they are.
+std::vector<bool> mostly_explained(const std::vector<double>& readings, const std::vector<bool>& explained,
+                                   std::size_t reach) {
+    std::vector<std::size_t> good_before{0};
+    std::vector<std::size_t> missed_before{0};
+    for (std::size_t k = 0; k < readings.size(); ++k) {
+        const bool is_good = !std::isnan(readings[k]);
+        good_before.push_back(good_before.back() + (is_good ? 1 : 0));
+        missed_before.push_back(missed_before.back() + (is_good && !explained[k] ? 1 : 0));
     }
-    return static_cast<double>(missed) <= most_unexplained * static_cast<double>(good);
+    std::vector<bool> mostly;
+    for (std::size_t k = 0; k < readings.size(); ++k) {
+        const std::size_t first = k - std::min(k, reach);
+        const std::size_t end = std::min(readings.size(), k + reach + 1);
+        const auto good = static_cast<double>(good_before[end] - good_before[first]);
+        const auto missed = static_cast<double>(missed_before[end] - missed_before[first]);
+        mostly.push_back(explained[k] && missed <= most_unexplained * good);
+    }
+    return mostly;
 }
 
 }  // namespace
@@ -217,10 +228,10 @@ std::optional<std::vector<double>> unrounded_room(const std::vector<double>& val
         // No number is within reach of a gap.
         explained.push_back(std::abs(curve[k] - readings[k]) <= 0.5 + 2.0 * noise);
     }
+    const std::vector<bool> taken = mostly_explained(readings, explained, near_knots * per_knot);
     std::vector<double> unrounded = values;
     for (std::size_t k = 0; k < values.size(); ++k) {
-        if (mostly_explained_about(k, readings, explained, near_knots * per_knot))
-            unrounded[k] = centre_C + step_C * curve[k];
+        if (taken[k]) unrounded[k] = centre_C + step_C * curve[k];
     }
     return unrounded;
 }
