@@ -23,6 +23,8 @@ class HeldOutFold {
                 const Eigen::VectorXd& targets, double epsilon);
 
     void start(double C, const TubeSolver::State& from) { solver_.start(C, from); }
+    /// As TubeSolver's.
+    void start_at_least_squares(double C, double smoothing) { solver_.start_at_least_squares(C, smoothing); }
     /// Goes on to this smoothing of the loss; the root of the held-out mean squared error there, [0, 1]
     /// scale.
     double rmse_at(double smoothing);

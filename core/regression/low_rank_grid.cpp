@@ -144,7 +144,7 @@ class GridSearch {
 
     /// The most promising point so far is cross-validated at once: a low bound saves the most.
     Result<void> look_at_column(std::size_t sigma) {
-        auto found = columns_[sigma].rough().look_at_first_fold(best_mean_mse_, true, cancelled_);
+        auto found = columns_[sigma].look_at_first_fold(best_mean_mse_, true, cancelled_);
         if (!found) return std::unexpected(found.error());
         const auto least = std::ranges::min_element(*found, {}, &SigmaCandidate::rough_rmse);
         least_by_column_.push_back(least->rough_rmse);
@@ -247,7 +247,7 @@ Result<std::vector<double>> cross_validate_low_rank(const LagProblem& problem, c
     std::vector<double> all;
     for (std::size_t sigma = 0; sigma < options.sigma_grid.size(); ++sigma) {
         SigmaColumn column(problem, sigma, folds, options, targets);
-        auto candidates = column.rough().look_at_first_fold(no_bound, false, cancelled);
+        auto candidates = column.look_at_first_fold(no_bound, false, cancelled);
         if (!candidates) return std::unexpected(candidates.error());
         std::ranges::sort(*candidates, {}, &SigmaCandidate::C_index);
         for (const SigmaCandidate& candidate : *candidates) {

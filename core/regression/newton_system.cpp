@@ -62,11 +62,16 @@ void gather_columns(const MatrixXd& by_row, std::span<const Index> rows, PanelMa
 /// Features in panels of eight rows, one column a feature.
 void gather_rows(const MatrixXd& by_row, std::span<const Index> rows, PanelMatrix& out) {
     const auto rank = static_cast<std::size_t>(by_row.rows());
-    out.set_zero(rows.size(), rank);
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-        const double* const features = by_row.col(rows[i]).data();
-        double* const lane = out.panel(i / height) + i % height;
-        for (std::size_t f = 0; f < rank; ++f) lane[f * height] = features[f];
+    out.resize(rows.size(), rank);
+    for (std::size_t p = 0; p < out.panels(); ++p) {
+        const std::size_t first = p * height;
+        const std::size_t here = std::min(height, rows.size() - first);
+        double* const panel = out.panel(p);
+        if (here < height) std::fill_n(panel, rank * height, 0.0);
+        for (std::size_t lane = 0; lane < here; ++lane) {
+            const double* const features = by_row.col(rows[first + lane]).data();
+            for (std::size_t f = 0; f < rank; ++f) panel[f * height + lane] = features[f];
+        }
     }
 }
 
@@ -142,38 +147,65 @@ void FeatureGram::add(const MatrixXd& by_row, const std::vector<Index>& rows, do
     }
 }
 
-const PanelMatrix& RowGram::over(const MatrixXd& by_row, const std::vector<Index>& bending) {
-    if (static_cast<std::size_t>(by_row.cols()) <= most_rows_multiplied_once) return picked(by_row, bending);
-    find_kept_and_fresh(bending);
-    if (fresh_.empty() && kept_.size() == rows_.size()) return products_;
-    if (!fresh_.empty()) gather_rows(by_row, bending, all_by_row_);
-    if (2 * fresh_.size() > bending.size()) {
-        products_.set_zero_lower(bending.size());
-        add_products(all_by_row_, 1.0, products_);
+void RowGram::over(const MatrixXd& by_row, const std::vector<Index>& bending, PanelMatrix& out) {
+    const auto all = static_cast<std::size_t>(by_row.cols());
+    if (all > most_rows_multiplied_once) {
+        follow(by_row, bending);
+        out = products_;
+        return;
+    }
+    if (of_all_.size() == 0 && is_all_cheaper_by_now(bending.size(), all)) multiply_all(by_row);
+    if (of_all_.size() > 0) {
+        pick(bending, out);
     } else {
+        multiply(by_row, bending, out);
+    }
+}
+
+/// As long as the few products were cheaper together than all would have been, they go on being made anew:
+/// that never costs more than twice what the better choice would have cost.
+bool RowGram::is_all_cheaper_by_now(std::size_t bending, std::size_t all) {
+    const auto blocks = [](std::size_t rows) {
+        const std::size_t panels = (rows + height - 1) / height;
+        return panels * (panels + 1) / 2;
+    };
+    blocks_made_ += blocks(bending) + 1;
+    return blocks_made_ > blocks(all);
+}
+
+void RowGram::multiply(const MatrixXd& by_row, const std::vector<Index>& bending, PanelMatrix& out) {
+    gather_rows(by_row, bending, all_by_row_);
+    out.set_zero_lower(bending.size());
+    add_products(all_by_row_, 1.0, out);
+}
+
+void RowGram::follow(const MatrixXd& by_row, const std::vector<Index>& bending) {
+    find_kept_and_fresh(bending);
+    if (fresh_.empty() && kept_.size() == rows_.size()) return;
+    if (2 * fresh_.size() > bending.size()) {
+        multiply(by_row, bending, products_);
+    } else {
+        if (!fresh_.empty()) gather_rows(by_row, bending, all_by_row_);
         bring_up_to_date(by_row, bending);
     }
     rows_ = bending;
-    return products_;
 }
 
-const PanelMatrix& RowGram::picked(const MatrixXd& by_row, const std::vector<Index>& bending) {
-    if (of_all_.size() == 0) multiply_all(by_row);
+void RowGram::pick(const std::vector<Index>& bending, PanelMatrix& out) const {
     const std::size_t count = bending.size();
-    products_.resize_lower(count);
-    for (std::size_t p = 0; p < products_.panels(); ++p) {
+    out.resize_lower(count);
+    for (std::size_t p = 0; p < out.panels(); ++p) {
         const std::size_t first = p * height;
         std::array<Index, height> rows{};
         for (std::size_t lane = 0; lane < height; ++lane)
             rows[lane] = bending[std::min(first + lane, count - 1)];
         for (std::size_t j = 0; j < std::min(first + height, count); ++j) {
             const double* const column = of_all_.col(bending[j]).data();
-            double* const eight = products_.eight(p, j);
+            double* const eight = out.eight(p, j);
             for (std::size_t lane = 0; lane < height; ++lane) eight[lane] = column[rows[lane]];
         }
     }
-    clear_padding(products_, count);
-    return products_;
+    clear_padding(out, count);
 }
 
 void RowGram::multiply_all(const MatrixXd& by_row) {
@@ -255,7 +287,7 @@ void NewtonSystem::in_row_space(const std::vector<Index>& bending, double curvat
                                 double bias_gradient, Direction& direction) {
     const auto rank = static_cast<std::size_t>(by_row_.rows());
     const auto rows = static_cast<Index>(bending.size());
-    system_ = row_gram_.over(by_row_, bending);
+    row_gram_.over(by_row_, bending, system_);
     for (std::size_t i = 0; i < system_.padded_rows(); ++i) system_.at(i, i) += 1.0 / curvature;
     factor_.factor(system_);
     without_bias_.setZero(static_cast<Index>(system_.padded_rows()));

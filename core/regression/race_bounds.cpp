@@ -12,6 +12,11 @@ double lowest_rmse(double rmse, double before, double smoothing) {
     return std::max(rmse / 4.0, without_change / (1.0 + 0.45 * std::sqrt(smoothing / rmse)));
 }
 
+double lowest_rmse_at_first(double rmse, double smoothing) {
+    constexpr double unseen_change = 2.5;
+    return lowest_rmse(rmse, rmse + unseen_change * smoothing, smoothing);
+}
+
 double hopeless_rmse(double best_mean_mse, std::size_t folds) {
     return 5.0 * std::sqrt(best_mean_mse * static_cast<double>(folds));
 }

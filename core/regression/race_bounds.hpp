@@ -8,6 +8,9 @@ namespace thermbal {
 /// smoothing has done.
 double lowest_rmse(double rmse, double before, double smoothing);
 
+/// The same where no step of smoothing has been seen yet.
+double lowest_rmse_at_first(double rmse, double smoothing);
+
 /// The first fold's error that is hopeless where the best mean squared error over `folds` folds is
 /// `best_mean_mse`.
 double hopeless_rmse(double best_mean_mse, std::size_t folds);

@@ -19,7 +19,7 @@ constexpr std::size_t rough_rows = 400;
 constexpr double rough_tolerance_factor = 100.0;
 constexpr double rough_truncation_share = 0.3;
 constexpr std::array first_smoothings{0.03, 0.003};
-constexpr double next_folds_smoothing = 0.01;
+constexpr double widest_on_noise = 0.01;
 
 /// From one C to the next, by as many folds as were fitted at both; 0 if none was.
 struct Growth {
@@ -63,15 +63,14 @@ double rough_smoothing(double rmse, double widest) {
     return std::clamp(0.1 * rmse, 3e-4, widest);
 }
 
-/// The first fold at the solver's C, smoothing by smoothing.
+/// The first fold at the solver's C, from near by.
 struct RoughFit {
     double rmse = 0.0;
     double lowest_rmse = 0.0;
 };
-template <typename HeldOut>
-RoughFit fit_roughly(HeldOut& fold, double last_smoothing) {
-    const double before = fold.rmse_at(first_smoothings[0]);
-    if (first_smoothings[1] > last_smoothing) static_cast<void>(fold.rmse_at(first_smoothings[1]));
+RoughFit fit_roughly(HeldOutFold& fold, double last_smoothing) {
+    const double before = fold.rmse_at(first_smoothings[1]);
+    if (last_smoothing >= first_smoothings[1]) return {before, lowest_rmse_at_first(before, last_smoothing)};
     const double rmse = fold.rmse_at(last_smoothing);
     return {rmse, lowest_rmse(rmse, before, last_smoothing)};
 }
@@ -108,14 +107,24 @@ RoughColumn::RoughColumn(const LagProblem& problem, std::size_t sigma_index, con
       targets_(targets),
       stride_(std::max<std::size_t>(1, problem.rows() / rough_rows)) {}
 
+double RoughColumn::finest_tolerance() const {
+    return rough_tolerance_factor * feature_tolerance(sigma_);
+}
+
 Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(double best_mean_mse, bool skip_hopeless,
                                                                     const Cancelled& cancelled) {
-    const double tolerance = rough_tolerance_factor * feature_tolerance(sigma_);
-    FoldsOnFeatures fitted(kernel_features(problem_, sigma_, tolerance, stride_), folds_, targets_,
+    FoldsOnFeatures fitted(kernel_features(problem_, sigma_, finest_tolerance(), stride_), folds_, targets_,
                            options_.epsilon);
+    auto candidates = look_at_first_fold(fitted, best_mean_mse, skip_hopeless, cancelled);
+    kernel_ = fitted.take_kernel();
+    return candidates;
+}
+
+Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(FoldsOnFeatures& fitted,
+                                                                    double best_mean_mse, bool skip_hopeless,
+                                                                    const Cancelled& cancelled) {
     HeldOutFold& first = fitted[0];
     const double hopeless = hopeless_rmse(best_mean_mse, folds_.size());
-    TubeSolver::State state = first.solver().cold_start();
     double largest_coefficient = std::numeric_limits<double>::infinity();
     std::vector<SigmaCandidate> candidates;
     for (std::size_t k = options_.C_grid.size(); k-- > 0;) {
@@ -127,10 +136,13 @@ Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(double best_
             candidates.back().C_index = k;
             continue;
         }
-        first.start(C, state);
+        if (candidates.empty()) {
+            first.start_at_least_squares(C, first_smoothings[1]);
+        } else {
+            first.start(C, candidates.back().rough_states.front());
+        }
         const RoughFit fit =
             fit_roughly(first, rough_smoothing(std::sqrt(best_mean_mse), first_smoothings[1]));
-        state = first.solver().state();
         const VectorXd& coefficients = first.solver().coefficients();
         largest_coefficient = coefficients.lpNorm<Eigen::Infinity>();
         const bool grows = !candidates.empty() && fit.rmse > candidates.back().rough_rmse;
@@ -140,18 +152,17 @@ Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(double best_
                               .lowest_rmse = fit.lowest_rmse,
                               .coefficient_sum = coefficients.lpNorm<1>(),
                               .rough_mean_mse = 0.0,
-                              .rough_states = {state},
+                              .rough_states = {first.solver().state()},
                               .rough_duals = {}});
         if (skip_hopeless && grows && fit.rmse > hopeless) break;
     }
-    kernel_ = fitted.take_kernel();
     return candidates;
 }
 
 Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double least_mse,
                                                     const Cancelled& cancelled) {
-    const double finest = rough_tolerance_factor * feature_tolerance(sigma_);
-    const double smoothing = rough_smoothing(noise_rmse, next_folds_smoothing);
+    const double finest = finest_tolerance();
+    const double smoothing = rough_smoothing(noise_rmse, widest_on_noise);
     KernelFactorisation factorisation(problem_, sigma_, stride_);
     const std::size_t most_features =
         features_worth_having(problem_.rows() / stride_, first_smoothings[0], noise_rmse);
@@ -219,7 +230,13 @@ std::vector<double> RoughColumn::fit_all_folds(Folds& folds, States& states, Sig
     const double C = options_.C_grid[fit.C_index] * static_cast<double>(stride_);
     auto& first = folds[0];
     first.start(C, std::move(states.front()));
-    fit.rough_rmse = fit_roughly(first, smoothing).rmse;
+    // Only the first fit of all has far to go: every other one starts from the same smoothing.
+    if (fit.C_index == 0) {
+        for (const double wider : first_smoothings) {
+            if (wider > smoothing) static_cast<void>(first.rmse_at(wider));
+        }
+    }
+    fit.rough_rmse = first.rmse_at(smoothing);
     states = {first.solver().state()};
     fit.coefficient_sum = first.solver().coefficients().template lpNorm<1>();
     const auto count = static_cast<double>(folds_.size());
@@ -228,7 +245,6 @@ std::vector<double> RoughColumn::fit_all_folds(Folds& folds, States& states, Sig
     for (std::size_t f = 1; f < folds_.size() && sum <= limit_mse * count; ++f) {
         auto& fold = folds[f];
         fold.start(C, states.front());
-        if (smoothing < next_folds_smoothing) static_cast<void>(fold.rmse_at(next_folds_smoothing));
         const double rmse = fold.rmse_at(smoothing);
         sum += rmse * rmse;
         fold_rmse.push_back(rmse);
@@ -239,6 +255,7 @@ std::vector<double> RoughColumn::fit_all_folds(Folds& folds, States& states, Sig
 }
 
 TubeSolver::State RoughColumn::on(const FoldsOnFeatures& folds, const TubeSolver::State& rough) const {
+    if (kernel_.pivots.empty()) return padded(rough, folds.kernel().by_row.rows());
     const TubeSolver::State all = padded(rough, kernel_.by_row.rows());
     return {weights_of(folds.kernel(), kernel_.pivots, pivot_coefficients(kernel_, all.weights)), all.bias};
 }

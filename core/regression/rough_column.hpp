@@ -46,12 +46,18 @@ class RoughColumn {
     /// cancelled.
     Result<std::vector<SigmaCandidate>> look_at_first_fold(double best_mean_mse, bool skip_hopeless,
                                                            const Cancelled& cancelled);
+    /// The same on features of all rows, the first of those that on() is asked for later. REQUIRES:
+    /// has_all_rows().
+    Result<std::vector<SigmaCandidate>> look_at_first_fold(FoldsOnFeatures& fitted, double best_mean_mse,
+                                                           bool skip_hopeless, const Cancelled& cancelled);
 
     /// All folds, from the smallest C up, for windows of noise: `noise_rmse` is about what no error falls
     /// below. Whose mean is beyond the margin from `least_mse` is no candidate; after one to three such in a
     /// row, the error growing, larger C are left out. Error: stop when cancelled.
     Result<RoughRanking> rank_by_all_folds(double noise_rmse, double least_mse, const Cancelled& cancelled);
 
+    /// Of the features: no prediction is then moved by more than a rough error may be off.
+    double finest_tolerance() const;
     bool has_all_rows() const { return stride_ == 1; }
 
     /// On windows of noise the point that wins on all rows is among those whose rough error is at most this
@@ -78,7 +84,7 @@ class RoughColumn {
     const SweepOptions& options_;
     const Eigen::VectorXd& targets_;
     std::size_t stride_;
-    KernelFeatures kernel_;  ///< of the candidates' rough_states
+    KernelFeatures kernel_;  ///< of the candidates' rough_states; none where they are on features given
 };
 
 }  // namespace thermbal

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "race_bounds.hpp"
 
@@ -20,24 +21,21 @@ double truncation_share(std::size_t rows) {
 constexpr std::size_t most_rows_of_whole_kernel = 2000;
 
 /// What is chosen by: a smoothing moves a prediction by about as much as it is wide.
-constexpr double across_folds_smoothing = 1e-2;
-constexpr std::array smoothings{1e-3, 1e-4, 1e-5, 1e-6};
+constexpr std::array smoothings{3e-4, 3e-5, 1e-6};
 
-/// On noise the last one changes nothing (README.md).
-constexpr std::size_t smoothings_on_noise = smoothings.size() - 1;
+/// On noise narrower ones change nothing (README.md). The first is left out where all folds have been roughly
+/// fitted to all rows.
+constexpr std::array noise_smoothings{1e-2, 1e-3, 1e-4, 1e-5};
+constexpr double widest_of_first_fold = 1e-3;
 
 /// On noise a candidate so much worse than the best one was at the same smoothing does not win. Measured on
 /// 628 windows (README.md): no winner was worse by more than 0.18 of the smoothing over the noise at the
 /// widest, 0.33 at 1e-3, 0.58 at 1e-4.
 double left_behind(double smoothing, double noise_rmse) {
-    const double share = smoothing == across_folds_smoothing ? 0.3 : smoothing >= smoothings[0] ? 0.5 : 0.8;
+    const double share = smoothing >= noise_smoothings[0]   ? 0.3
+                         : smoothing >= noise_smoothings[1] ? 0.5
+                                                            : 0.8;
     return 1.0 + share * smoothing / noise_rmse;
-}
-
-/// As lowest_rmse(), where no step of smoothing has been seen yet. Measured on 4662 fits (README.md): none
-/// fell by more than 1.4 of the smoothing.
-double lowest_rmse_across_folds(double rmse) {
-    return rmse - 3.0 * across_folds_smoothing;
 }
 
 /// Features more precise than need be cost less than new ones, if they are not many more.
@@ -56,9 +54,9 @@ class SigmaColumn::Race {
         lowest_[0] = std::max(candidate.lowest_rmse, least_[0]);
     }
 
-    void set_start(std::size_t fold, double rmse) {
+    void set_start(std::size_t fold, double rmse, double smoothing) {
         rmse_[fold] = rmse;
-        if (fold > 0) lowest_[fold] = std::max(lowest_rmse_across_folds(rmse), least_[fold]);
+        if (fold > 0) lowest_[fold] = std::max(lowest_rmse_at_first(rmse, smoothing), least_[fold]);
     }
     void set(std::size_t fold, double rmse, double smoothing, bool is_last) {
         const double lowest = lowest_rmse(rmse, rmse_[fold], smoothing);
@@ -91,13 +89,20 @@ SigmaColumn::SigmaColumn(const LagProblem& problem, std::size_t sigma_index, con
       targets_(targets),
       rough_(problem, sigma_index, folds, options, targets) {}
 
+Result<std::vector<SigmaCandidate>> SigmaColumn::look_at_first_fold(double best_mean_mse, bool skip_hopeless,
+                                                                    const Cancelled& cancelled) {
+    if (!rough_.has_all_rows()) return rough_.look_at_first_fold(best_mean_mse, skip_hopeless, cancelled);
+    FoldsOnFeatures fitted(factorisation().features(rough_.finest_tolerance()), folds_, targets_,
+                           options_.epsilon);
+    return rough_.look_at_first_fold(fitted, best_mean_mse, skip_hopeless, cancelled);
+}
+
 Result<std::optional<RaceResult>> SigmaColumn::race(const SigmaCandidate& candidate, const RaceTerms& terms,
                                                     const Cancelled& cancelled) {
     Race race(candidate, terms.least_rmse);
     if (race.is_lost(terms.bound)) return std::nullopt;
-    const double tolerance =
-        truncation(truncation_share(problem_.rows()), terms.small_rmse, candidate.coefficient_sum,
-                   fine_tolerance_factor * feature_tolerance(sigma_));
+    const double tolerance = truncation(truncation_share(problem_.rows()), terms.small_rmse,
+                                        candidate.coefficient_sum, finest_tolerance());
     if (terms.noise_rmse > 0.0 && wants_whole_kernel(tolerance, terms.noise_rmse)) {
         if (!whole_) {
             whole_ = std::make_unique<FoldsOnKernel>(whole_kernel(problem_, sigma_), folds_, targets_,
@@ -119,12 +124,11 @@ Result<std::optional<RaceResult>> SigmaColumn::first_fold_ahead(const SigmaCandi
             if (cancelled()) return sweep_cancelled();
             if (step == 0) {
                 start_fold(*fitted_, f, candidate);
-                race.set_start(f,
-                               (*fitted_)[f].rmse_at(f == 0 ? smoothings.front() : across_folds_smoothing));
+                race.set_start(f, (*fitted_)[f].rmse_at(smoothings.front()), smoothings.front());
                 if (race.is_lost(terms.bound)) return std::nullopt;
             }
             const std::size_t next = f == 0 ? step + 1 : step;
-            if (next == smoothings.size()) continue;
+            if (next == 0 || next == smoothings.size()) continue;
             race.set(f, (*fitted_)[f].rmse_at(smoothings[next]), smoothings[next],
                      next + 1 == smoothings.size());
             if (race.is_lost(terms.bound)) return std::nullopt;
@@ -141,8 +145,7 @@ Result<std::optional<RaceResult>> SigmaColumn::all_folds_abreast(Folds& folds,
                                                                  const RaceTerms& terms,
                                                                  const Cancelled& cancelled) {
     const bool is_near = rough_.has_all_rows();
-    std::vector<double> stages(smoothings.begin(), smoothings.begin() + smoothings_on_noise);
-    if (!is_near) stages.insert(stages.begin(), across_folds_smoothing);
+    const std::span<const double> stages = std::span(noise_smoothings).subspan(is_near ? 1 : 0);
     RaceResult result;
     for (std::size_t stage = 0; stage < stages.size(); ++stage) {
         for (std::size_t f = 0; f < folds_.size(); ++f) {
@@ -150,9 +153,9 @@ Result<std::optional<RaceResult>> SigmaColumn::all_folds_abreast(Folds& folds,
             if (stage == 0) start_fold(folds, f, candidate);
             // Fold 0 leads: the others start from it.
             const double rmse =
-                folds[f].rmse_at(f == 0 ? std::min(stages[stage], smoothings.front()) : stages[stage]);
+                folds[f].rmse_at(f == 0 ? std::min(stages[stage], widest_of_first_fold) : stages[stage]);
             if (stage == 0) {
-                race.set_start(f, rmse);
+                race.set_start(f, rmse, stages[stage]);
             } else {
                 race.set(f, rmse, stages[stage], stage + 1 == stages.size());
             }
@@ -182,6 +185,10 @@ bool SigmaColumn::has_features_for(double tolerance) const {
     return fitted_ && tolerance_ <= tolerance && is_worth_keeping(fitted_->kernel(), tolerance);
 }
 
+double SigmaColumn::finest_tolerance() const {
+    return fine_tolerance_factor * feature_tolerance(sigma_);
+}
+
 KernelFactorisation& SigmaColumn::factorisation() {
     if (!factorisation_) factorisation_.emplace(problem_, sigma_);
     return *factorisation_;
@@ -197,7 +204,7 @@ void SigmaColumn::truncate_at(double tolerance) {
 
 bool SigmaColumn::wants_whole_kernel(double tolerance, double noise_rmse) {
     if (problem_.rows() > most_rows_of_whole_kernel || has_features_for(tolerance)) return false;
-    const double widest = rough_.has_all_rows() ? smoothings.front() : across_folds_smoothing;
+    const double widest = noise_smoothings[rough_.has_all_rows() ? 1 : 0];
     return !factorisation().is_within(features_worth_having(problem_.rows(), widest, noise_rmse), tolerance);
 }
 

@@ -45,6 +45,10 @@ class SigmaColumn {
 
     RoughColumn& rough() { return rough_; }
 
+    /// RoughColumn's; where that leaves no rows out, on the first of the features of race().
+    Result<std::vector<SigmaCandidate>> look_at_first_fold(double best_mean_mse, bool skip_hopeless,
+                                                           const Cancelled& cancelled);
+
     /// Nothing as soon as the mean is sure to end above terms.bound. Error: stop when cancelled.
     Result<std::optional<RaceResult>> race(const SigmaCandidate& candidate, const RaceTerms& terms,
                                            const Cancelled& cancelled);
@@ -54,6 +58,7 @@ class SigmaColumn {
     void release();
 
   private:
+    double finest_tolerance() const;
     bool has_features_for(double tolerance) const;
     KernelFactorisation& factorisation();
     void truncate_at(double tolerance);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "base/median.hpp"
@@ -41,6 +42,21 @@ void TubeSolver::start(double C, const State& start) {
     slope_sum_ *= C / tube_.C;
     tube_.C = C;
     tube_.epsilon = epsilon_;
+}
+
+/// One Newton step from the cold start, on the loss with every row on its quadratic piece and no epsilon.
+void TubeSolver::start_at_least_squares(double C, double smoothing) {
+    start(C, cold_start());
+    tube_.smoothing = smoothing;
+    const double curvature = C / smoothing;
+    slope_changes_.assign(residuals_.begin(), residuals_.end());
+    for (double& slope : slope_changes_) slope *= -curvature;
+    gradient_.setZero(slope_sum_.size());
+    vector_loops::add_rows(system_->by_row().data(), static_cast<std::size_t>(slope_sum_.size()), rows_,
+                           slope_changes_, gradient_.data());
+    bias_gradient_ = std::accumulate(slope_changes_.begin(), slope_changes_.end(), 0.0);
+    system_->solve(rows_, curvature, gradient_, bias_gradient_, direction_);
+    start(C, {direction_.weights, state_.bias + direction_.bias});
 }
 
 bool TubeSolver::descend_to(double smoothing, int most_steps) {

@@ -34,22 +34,28 @@ class FeatureGram {
     PanelMatrix gathered_;
 };
 
-/// The inner products of the bending rows with one another: picked from those of all rows where these are
-/// few, otherwise brought up to date.
+/// The inner products of the bending rows with one another. Where there are few rows: made anew, until that
+/// has cost as much as those of all rows would, from which they are then picked. Otherwise brought up to
+/// date.
 class RowGram {
   public:
-    const PanelMatrix& over(const Eigen::MatrixXd& by_row, const std::vector<Eigen::Index>& bending);
+    /// `out`: the lower triangle, zeros in the padding.
+    void over(const Eigen::MatrixXd& by_row, const std::vector<Eigen::Index>& bending, PanelMatrix& out);
     std::size_t kept_numbers() const {
         return products_.numbers() + new_products_.numbers() + static_cast<std::size_t>(of_all_.size());
     }
 
   private:
-    const PanelMatrix& picked(const Eigen::MatrixXd& by_row, const std::vector<Eigen::Index>& bending);
+    bool is_all_cheaper_by_now(std::size_t bending, std::size_t all);
+    void multiply(const Eigen::MatrixXd& by_row, const std::vector<Eigen::Index>& bending, PanelMatrix& out);
+    void pick(const std::vector<Eigen::Index>& bending, PanelMatrix& out) const;
+    void follow(const Eigen::MatrixXd& by_row, const std::vector<Eigen::Index>& bending);
     void multiply_all(const Eigen::MatrixXd& by_row);
     void find_kept_and_fresh(const std::vector<Eigen::Index>& bending);
     void bring_up_to_date(const Eigen::MatrixXd& by_row, const std::vector<Eigen::Index>& bending);
 
     Eigen::MatrixXd of_all_;
+    std::size_t blocks_made_ = 0;  ///< of eight by eight products, before of_all_
     PanelMatrix products_, new_products_;
     std::vector<Eigen::Index> rows_;                         ///< of products_
     std::vector<std::pair<std::size_t, std::size_t>> kept_;  ///< place among the bending rows, and in rows_

@@ -43,6 +43,9 @@ class TubeSolver {
     /// The two halves of fit(): C and where to start from, then one smoothing after the other, each to where
     /// a further step moves no prediction by more than 0.3 of it. False as fit().
     void start(double C, const State& start);
+    /// Instead, from the regularised least squares fit to all rows, the squares weighed C / (2 smoothing):
+    /// nothing is known yet, and a wide smoothing would come close to that in many steps.
+    void start_at_least_squares(double C, double smoothing);
     [[nodiscard]] bool descend_to(double smoothing, int most_steps);
 
     const State& state() const { return state_; }
