@@ -17,8 +17,21 @@ double lowest_rmse_at_first(double rmse, double smoothing) {
     return lowest_rmse(rmse, rmse + unseen_change * smoothing, smoothing);
 }
 
+namespace {
+
+/// The first fold's error that alone makes the mean worse than the best.
+double losing_rmse(double best_mean_mse, std::size_t folds) {
+    return std::sqrt(best_mean_mse * static_cast<double>(folds));
+}
+
+}  // namespace
+
+double worse_rmse(double best_mean_mse, std::size_t folds) {
+    return 1.5 * losing_rmse(best_mean_mse, folds);
+}
+
 double hopeless_rmse(double best_mean_mse, std::size_t folds) {
-    return 5.0 * std::sqrt(best_mean_mse * static_cast<double>(folds));
+    return 5.0 * losing_rmse(best_mean_mse, folds);
 }
 
 double truncation(double share, double rmse, double coefficient_sum, double finest) {

@@ -13,7 +13,9 @@ double lowest_rmse_at_first(double rmse, double smoothing);
 
 /// The first fold's error that is hopeless where the best mean squared error over `folds` folds is
 /// `best_mean_mse`.
+/// worse_rmse: which is, where the next one is worse still.
 double hopeless_rmse(double best_mean_mse, std::size_t folds);
+double worse_rmse(double best_mean_mse, std::size_t folds);
 
 /// To where a kernel may be truncated when an error of `share` of `rmse` in the predictions does not matter:
 /// no prediction moves by more than the tolerance times the sum of |c|. In steps, so that an error a little

@@ -125,6 +125,8 @@ Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(FoldsOnFeatu
                                                                     const Cancelled& cancelled) {
     HeldOutFold& first = fitted[0];
     const double hopeless = hopeless_rmse(best_mean_mse, folds_.size());
+    const double worse = worse_rmse(best_mean_mse, folds_.size());
+    int worse_in_a_row = 0;
     double largest_coefficient = std::numeric_limits<double>::infinity();
     std::vector<SigmaCandidate> candidates;
     for (std::size_t k = options_.C_grid.size(); k-- > 0;) {
@@ -154,7 +156,9 @@ Result<std::vector<SigmaCandidate>> RoughColumn::look_at_first_fold(FoldsOnFeatu
                               .rough_mean_mse = 0.0,
                               .rough_states = {first.solver().state()},
                               .rough_duals = {}});
-        if (skip_hopeless && grows && fit.rmse > hopeless) break;
+        worse_in_a_row = grows && fit.rmse > worse ? worse_in_a_row + 1 : 0;
+        const bool is_hopeless = worse_in_a_row > 1 || (grows && fit.rmse > hopeless);
+        if (skip_hopeless && is_hopeless) break;
     }
     return candidates;
 }
