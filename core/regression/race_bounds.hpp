@@ -11,9 +11,8 @@ double lowest_rmse(double rmse, double before, double smoothing);
 /// The same where no step of smoothing has been seen yet.
 double lowest_rmse_at_first(double rmse, double smoothing);
 
-/// The first fold's error that is hopeless where the best mean squared error over `folds` folds is
-/// `best_mean_mse`.
-/// worse_rmse: which is, where the next one is worse still.
+/// First folds' errors that lose where the best mean squared error over `folds` folds is `best_mean_mse`:
+/// alone, and where the next C's is larger still.
 double hopeless_rmse(double best_mean_mse, std::size_t folds);
 double worse_rmse(double best_mean_mse, std::size_t folds);
 
