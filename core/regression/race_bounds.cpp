@@ -42,8 +42,9 @@ double truncation(double share, double rmse, double coefficient_sum, double fine
 
 std::size_t features_worth_having(std::size_t rows, double smoothing, double noise_rmse) {
     // Normally distributed residuals: 0.8 of the rows bend times the smoothing over their standard deviation.
-    // Fewer features than half the rows are not slower (README.md).
-    const double share = std::clamp(1.2 * smoothing / noise_rmse, 0.5, 1.0);
+    // Fewer features than half of few rows, or a quarter of many, are not slower (README.md).
+    const double never_too_many = rows < 800 ? 0.5 : 0.25;
+    const double share = std::clamp(1.2 * smoothing / noise_rmse, never_too_many, 1.0);
     return static_cast<std::size_t>(share * static_cast<double>(rows));
 }
 

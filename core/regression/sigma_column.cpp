@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <span>
+#include <vector>
 
 #include "race_bounds.hpp"
 
@@ -12,9 +12,9 @@ namespace {
 
 constexpr double fine_tolerance_factor = 10.0;
 /// Of the error to beat, what the truncation of a kernel may move a prediction by at the very most. Where the
-/// rows are many, their parts of it cancel (README.md).
-double truncation_share(std::size_t rows) {
-    return rows < 800 ? 0.1 : 1.0;
+/// rows are many their parts of it cancel, and the better, the more of them is noise (README.md).
+double truncation_share(std::size_t rows, double noise_in_epsilons) {
+    return rows < 800 ? 0.1 : std::clamp(0.5 * noise_in_epsilons, 1.0, 32.0);
 }
 
 /// 32 MB.
@@ -23,18 +23,31 @@ constexpr std::size_t most_rows_of_whole_kernel = 2000;
 /// What is chosen by: a smoothing moves a prediction by about as much as it is wide.
 constexpr std::array smoothings{3e-4, 3e-5, 1e-6};
 
-/// On noise narrower ones change nothing (README.md). The first is left out where all folds have been roughly
-/// fitted to all rows.
-constexpr std::array noise_smoothings{1e-2, 1e-3, 1e-4, 1e-5};
-constexpr double widest_of_first_fold = 1e-3;
+/// On noise narrower ones than the last change nothing (README.md). A wider one comes before them where not
+/// all folds have been roughly fitted to all rows; not so wide that most rows bend.
+constexpr std::array noise_smoothings{1e-3, 1e-4, 1e-5};
+constexpr double widest_of_noise_race = 1e-2;
+constexpr double widest_share_of_noise = 0.15;
+
+std::vector<double> smoothings_on_noise(bool is_near, double noise_rmse) {
+    std::vector<double> stages(noise_smoothings.begin(), noise_smoothings.end());
+    if (is_near) return stages;
+    const double widest = std::min(widest_of_noise_race, widest_share_of_noise * noise_rmse);
+    if (widest < 3.0 * stages.front()) {
+        stages.front() = widest;
+    } else {
+        stages.insert(stages.begin(), widest);
+    }
+    return stages;
+}
 
 /// On noise a candidate so much worse than the best one was at the same smoothing does not win. Measured on
-/// 628 windows (README.md): no winner was worse by more than 0.18 of the smoothing over the noise at the
-/// widest, 0.33 at 1e-3, 0.58 at 1e-4.
+/// 628 windows (README.md): no winner was worse by more than 0.18 of the smoothing over the noise at 1e-2,
+/// 0.33 at 1e-3, 0.58 at 1e-4.
 double left_behind(double smoothing, double noise_rmse) {
-    const double share = smoothing >= noise_smoothings[0]   ? 0.3
-                         : smoothing >= noise_smoothings[1] ? 0.5
-                                                            : 0.8;
+    const double share = smoothing >= widest_of_noise_race       ? 0.3
+                         : smoothing >= noise_smoothings.front() ? 0.5
+                                                                 : 0.8;
     return 1.0 + share * smoothing / noise_rmse;
 }
 
@@ -101,8 +114,9 @@ Result<std::optional<RaceResult>> SigmaColumn::race(const SigmaCandidate& candid
                                                     const Cancelled& cancelled) {
     Race race(candidate, terms.least_rmse);
     if (race.is_lost(terms.bound)) return std::nullopt;
-    const double tolerance = truncation(truncation_share(problem_.rows()), terms.small_rmse,
-                                        candidate.coefficient_sum, finest_tolerance());
+    const double share = truncation_share(problem_.rows(), terms.noise_rmse / options_.epsilon);
+    const double tolerance =
+        truncation(share, terms.small_rmse, candidate.coefficient_sum, finest_tolerance());
     if (terms.noise_rmse > 0.0 && wants_whole_kernel(tolerance, terms.noise_rmse)) {
         if (!whole_) {
             whole_ = std::make_unique<FoldsOnKernel>(whole_kernel(problem_, sigma_), folds_, targets_,
@@ -144,16 +158,13 @@ Result<std::optional<RaceResult>> SigmaColumn::all_folds_abreast(Folds& folds,
                                                                  const SigmaCandidate& candidate, Race& race,
                                                                  const RaceTerms& terms,
                                                                  const Cancelled& cancelled) {
-    const bool is_near = rough_.has_all_rows();
-    const std::span<const double> stages = std::span(noise_smoothings).subspan(is_near ? 1 : 0);
+    const std::vector<double> stages = smoothings_on_noise(rough_.has_all_rows(), terms.noise_rmse);
     RaceResult result;
     for (std::size_t stage = 0; stage < stages.size(); ++stage) {
         for (std::size_t f = 0; f < folds_.size(); ++f) {
             if (cancelled()) return sweep_cancelled();
             if (stage == 0) start_fold(folds, f, candidate);
-            // Fold 0 leads: the others start from it.
-            const double rmse =
-                folds[f].rmse_at(f == 0 ? std::min(stages[stage], widest_of_first_fold) : stages[stage]);
+            const double rmse = folds[f].rmse_at(stages[stage]);
             if (stage == 0) {
                 race.set_start(f, rmse, stages[stage]);
             } else {
@@ -204,8 +215,9 @@ void SigmaColumn::truncate_at(double tolerance) {
 
 bool SigmaColumn::wants_whole_kernel(double tolerance, double noise_rmse) {
     if (problem_.rows() > most_rows_of_whole_kernel || has_features_for(tolerance)) return false;
-    const double widest = noise_smoothings[rough_.has_all_rows() ? 1 : 0];
-    return !factorisation().is_within(features_worth_having(problem_.rows(), widest, noise_rmse), tolerance);
+    const double widest = smoothings_on_noise(rough_.has_all_rows(), noise_rmse).front();
+    return !factorisation().is_likely_within(features_worth_having(problem_.rows(), widest, noise_rmse),
+                                             tolerance);
 }
 
 /// From where the fold was roughly; where rows were left out there, the others from the first.
