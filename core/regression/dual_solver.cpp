@@ -22,7 +22,7 @@ constexpr double rounding = 1e-9;
 }  // namespace
 
 DualSolver::DualSolver(const WholeKernel& kernel, const VectorXd& targets, VectorXd is_trained,
-                       double epsilon)
+                       double epsilon, Workspace& workspace)
     : kernel_(&kernel),
       targets_(&targets),
       is_trained_(std::move(is_trained)),
@@ -30,7 +30,8 @@ DualSolver::DualSolver(const WholeKernel& kernel, const VectorXd& targets, Vecto
       slopes_(VectorXd::Zero(targets.size())),
       direction_(targets.size()),
       of_kernel_(targets.size()),
-      change_(targets.size()) {}
+      change_(targets.size()),
+      workspace_(&workspace) {}
 
 DualSolver::State DualSolver::cold_start() const {
     std::vector<double> trained;
@@ -125,34 +126,35 @@ void DualSolver::newton_direction() {
     if (bending_.empty()) {
         bias_direction_ = -bias_gradient / (1e-3 * curvature);
     } else {
-        pick_bending();
-        for (std::size_t i = 0; i < system_.padded_rows(); ++i) system_.at(i, i) += 1.0 / curvature;
-        factor_.factor(system_);
+        auto& [system, factor, at_bending, of_bias, of_bending] = *workspace_;
+        pick_bending(system);
+        for (std::size_t i = 0; i < system.padded_rows(); ++i) system.at(i, i) += 1.0 / curvature;
+        factor.factor(system);
         const auto bends = static_cast<Index>(bending_.size());
-        const auto padded = static_cast<Index>(system_.padded_rows());
-        at_bending_.setZero(padded);
+        const auto padded = static_cast<Index>(system.padded_rows());
+        at_bending.setZero(padded);
         for (Index b = 0; b < bends; ++b) {
-            at_bending_(b) = -of_kernel_(bending_[static_cast<std::size_t>(b)]);
+            at_bending(b) = -of_kernel_(bending_[static_cast<std::size_t>(b)]);
         }
-        factor_.solve_lower(at_bending_.data());
-        of_bias_.setZero(padded);
-        of_bias_.head(bends).setOnes();
-        factor_.solve_lower(of_bias_.data());
-        bias_direction_ = (of_bias_.dot(at_bending_) - bias_gradient) / of_bias_.squaredNorm();
-        at_bending_ -= bias_direction_ * of_bias_;
-        factor_.solve_upper(at_bending_.data());
-        of_bending_.assign(at_bending_.data(), at_bending_.data() + bends);
-        for (std::size_t b = 0; b < bending_.size(); ++b) direction_(bending_[b]) += of_bending_[b];
-        add_kernel_columns(bending_, of_bending_);
+        factor.solve_lower(at_bending.data());
+        of_bias.setZero(padded);
+        of_bias.head(bends).setOnes();
+        factor.solve_lower(of_bias.data());
+        bias_direction_ = (of_bias.dot(at_bending) - bias_gradient) / of_bias.squaredNorm();
+        at_bending -= bias_direction_ * of_bias;
+        factor.solve_upper(at_bending.data());
+        of_bending.assign(at_bending.data(), at_bending.data() + bends);
+        for (std::size_t b = 0; b < bending_.size(); ++b) direction_(bending_[b]) += of_bending[b];
+        add_kernel_columns(bending_, of_bending);
     }
     change_ = (of_kernel_.array() + bias_direction_) * is_trained_.array();
 }
 
-void DualSolver::pick_bending() {
+void DualSolver::pick_bending(PanelMatrix& system) const {
     constexpr std::size_t panel_height = PanelMatrix::height;
     const std::size_t count = bending_.size();
-    system_.resize_lower(count);
-    for (std::size_t p = 0; p < system_.panels(); ++p) {
+    system.resize_lower(count);
+    for (std::size_t p = 0; p < system.panels(); ++p) {
         const std::size_t first = p * panel_height;
         std::array<Index, panel_height> rows{};
         for (std::size_t lane = 0; lane < panel_height; ++lane) {
@@ -160,12 +162,12 @@ void DualSolver::pick_bending() {
         }
         for (std::size_t j = 0; j < std::min(first + panel_height, count); ++j) {
             const double* const column = kernel_->by_row.col(bending_[j]).data();
-            double* const eight = system_.eight(p, j);
+            double* const eight = system.eight(p, j);
             for (std::size_t lane = 0; lane < panel_height; ++lane) eight[lane] = column[rows[lane]];
         }
     }
-    for (std::size_t i = count; i < system_.padded_rows(); ++i) {
-        for (std::size_t j = 0; j <= i; ++j) system_.at(i, j) = 0.0;
+    for (std::size_t i = count; i < system.padded_rows(); ++i) {
+        for (std::size_t j = 0; j <= i; ++j) system.at(i, j) = 0.0;
     }
 }
 

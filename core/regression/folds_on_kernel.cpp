@@ -29,9 +29,9 @@ VectorXd targets_on(const WholeKernel& kernel, const VectorXd& targets) {
 }  // namespace
 
 HeldOutOfKernel::HeldOutOfKernel(const WholeKernel& kernel, const Fold& fold, const VectorXd& targets,
-                                 double epsilon)
+                                 double epsilon, DualSolver::Workspace& workspace)
     : solver_(kernel, targets, ones_at(kernel_rows(fold.training_rows, kernel.stride), targets.size()),
-              epsilon),
+              epsilon, workspace),
       held_out_(kernel_rows(fold.held_out_rows, kernel.stride)) {}
 
 double HeldOutOfKernel::rmse_at(double smoothing) {

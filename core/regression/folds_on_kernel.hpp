@@ -17,9 +17,9 @@ namespace thermbal {
 /// a thread.
 class HeldOutOfKernel {
   public:
-    /// `targets`: as DualSolver's.
+    /// `targets` and `workspace`: as DualSolver's.
     HeldOutOfKernel(const WholeKernel& kernel, const Fold& fold, const Eigen::VectorXd& targets,
-                    double epsilon);
+                    double epsilon, DualSolver::Workspace& workspace);
 
     void start(double C, DualSolver::State from) { solver_.start(C, std::move(from)); }
     /// As HeldOutFold's.
@@ -42,7 +42,7 @@ class FoldsOnKernel {
     FoldsOnKernel(const FoldsOnKernel&) = delete;
 
     HeldOutOfKernel& operator[](std::size_t f) {
-        if (!fitted_[f]) fitted_[f].emplace(kernel_, folds_[f], targets_, epsilon_);
+        if (!fitted_[f]) fitted_[f].emplace(kernel_, folds_[f], targets_, epsilon_, workspace_);
         return *fitted_[f];
     }
     /// The function with these coefficients at these rows of the problem, which must be the kernel's, too.
@@ -55,6 +55,7 @@ class FoldsOnKernel {
     const std::vector<Fold>& folds_;
     Eigen::VectorXd targets_;  ///< of the kernel's rows, and zeros
     double epsilon_;
+    DualSolver::Workspace workspace_;
     std::vector<std::optional<HeldOutOfKernel>> fitted_;
 };
 

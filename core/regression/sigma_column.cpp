@@ -119,6 +119,7 @@ Result<std::optional<RaceResult>> SigmaColumn::race(const SigmaCandidate& candid
         truncation(share, terms.small_rmse, candidate.coefficient_sum, finest_tolerance());
     if (terms.noise_rmse > 0.0 && wants_whole_kernel(tolerance, terms.noise_rmse)) {
         if (!whole_) {
+            fitted_.reset();  // A second large matrix: it is soon made again.
             whole_ = std::make_unique<FoldsOnKernel>(whole_kernel(problem_, sigma_), folds_, targets_,
                                                      options_.epsilon);
         }

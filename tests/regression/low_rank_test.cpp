@@ -262,7 +262,8 @@ TEST(DualSolver, TheGapToTheDualObjectiveIsClosed) {
         y.head(rows) = Eigen::Map<const VectorXd>(problem.targets().data(), rows);
         VectorXd is_trained = VectorXd::Zero(y.size());
         is_trained.segment(held_out, rows - held_out).setOnes();
-        DualSolver solver(whole, y, is_trained, 0.001);
+        DualSolver::Workspace workspace;
+        DualSolver solver(whole, y, is_trained, 0.001, workspace);
         solver.start(point.C, solver.cold_start());
         for (double smoothing = 0.1; smoothing > 0.9e-5; smoothing *= 0.1) {
             // A first time to 0.3 of the smoothing; a step or more each time after that. The race ends there.

@@ -22,10 +22,18 @@ class DualSolver {
         Eigen::VectorXd residuals;  ///< target - function, of every row
     };
 
-    /// `targets` and `is_trained` (1 or 0): one a row of the kernel, which must outlive it, with zeros up to
-    /// a multiple of eight.
+    /// What a step needs and no fit keeps: solvers that never step at once may have one between them.
+    struct Workspace {
+        PanelMatrix system;
+        PanelCholesky factor;
+        Eigen::VectorXd at_bending, of_bias;
+        std::vector<double> of_bending;
+    };
+
+    /// `targets` and `is_trained` (1 or 0): one a row of the kernel, which must outlive it, as the workspace
+    /// must, with zeros up to a multiple of eight.
     DualSolver(const WholeKernel& kernel, const Eigen::VectorXd& targets, Eigen::VectorXd is_trained,
-               double epsilon);
+               double epsilon, Workspace& workspace);
 
     /// Coefficients 0, bias the median target of the rows it is trained on.
     State cold_start() const;
@@ -43,7 +51,7 @@ class DualSolver {
     bool descend(double smoothing, double still, int most_steps);
     void take_slopes();
     void newton_direction();
-    void pick_bending();
+    void pick_bending(PanelMatrix& system) const;
     double step_length() const;
     void centre_undetermined_bias();
     void add_kernel_columns(const std::vector<Eigen::Index>& rows, const std::vector<double>& factors);
@@ -62,10 +70,7 @@ class DualSolver {
     double bias_direction_ = 0.0;
     Eigen::VectorXd of_kernel_;  ///< change of every prediction without the bias
     Eigen::VectorXd change_;     ///< of the predictions it is trained on
-    PanelMatrix system_;
-    PanelCholesky factor_;
-    Eigen::VectorXd at_bending_, of_bias_;
-    std::vector<double> of_bending_;
+    Workspace* workspace_;
 };
 
 }  // namespace thermbal

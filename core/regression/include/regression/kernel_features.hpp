@@ -34,8 +34,8 @@ class KernelFactorisation {
     KernelFactorisation(KernelFactorisation&&) = default;
 
     KernelFeatures features(double tolerance);
-    /// Whether that many features at most keep to the tolerance. Yes is sure; no may be a guess from the first
-    /// of them, which saves making the others.
+    /// Whether that many features at most keep to the tolerance. Yes is sure; no may be a guess from the
+    /// first of them, which saves making the others.
     bool is_likely_within(std::size_t most_features, double tolerance);
     std::size_t kept_numbers() const { return features_.size() * rows_; }
 
