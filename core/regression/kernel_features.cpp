@@ -11,8 +11,6 @@ namespace thermbal {
 
 namespace {
 
-constexpr std::size_t fewest_to_judge_by = 64;
-
 /// One row's features side by side, the first `count` of them.
 Eigen::MatrixXd rows_of(const std::vector<std::vector<double>>& features, std::size_t count) {
     const auto rank = static_cast<Eigen::Index>(count);
@@ -89,29 +87,12 @@ KernelFeatures KernelFactorisation::features(double tolerance) {
             .stride = stride_};
 }
 
-bool KernelFactorisation::is_likely_within(std::size_t most_features, double tolerance) {
+bool KernelFactorisation::is_within(std::size_t most_features, double tolerance) {
     const std::size_t most = std::min(most_features, rows_);
-    for (std::size_t count = fewest_to_judge_by; count < most; count *= 2) {
-        extend_to(tolerance, count);
-        if (left_over_behind(count) <= tolerance) return true;
-        if (expected_left_over(count, most) > tolerance) return false;
-    }
     extend_to(tolerance, most);
-    return left_over_behind(most) <= tolerance;
-}
-
-/// REQUIRES: so many features, or all that were asked for, if fewer.
-double KernelFactorisation::left_over_behind(std::size_t features) const {
-    return pivots_.size() > features ? largest_left_over_[features] : *std::ranges::max_element(left_over_);
-}
-
-/// After `most` features, judged by the latter half of the first `count`: what is left over falls ever more
-/// slowly with their number, but for a step where the products of so many samples are complete.
-double KernelFactorisation::expected_left_over(std::size_t count, std::size_t most) const {
-    const double now = left_over_behind(count);
-    const double a_feature =
-        std::log(now / largest_left_over_[count / 2]) / static_cast<double>(count - count / 2);
-    return now * std::exp(a_feature * static_cast<double>(most - count));
+    const double left_over =
+        pivots_.size() > most ? largest_left_over_[most] : *std::ranges::max_element(left_over_);
+    return left_over <= tolerance;
 }
 
 KernelFeatures kernel_features(const LagProblem& problem, double sigma, double tolerance,

@@ -183,7 +183,7 @@ Result<RoughRanking> RoughColumn::rank_by_all_folds(double noise_rmse, double le
     for (std::size_t k = 0; k < options_.C_grid.size() && !patience.is_over(); ++k) {
         if (cancelled()) return sweep_cancelled();
         const double needed = truncation(rough_truncation_share, noise_rmse, largest_sum, finest);
-        if (!on_kernel && !factorisation.is_likely_within(most_features, needed)) {
+        if (!on_kernel && !factorisation.is_within(most_features, needed)) {
             on_kernel = std::make_unique<FoldsOnKernel>(whole_kernel(problem_, sigma_, stride_), folds_,
                                                         targets_, options_.epsilon);
             if (on_features) {

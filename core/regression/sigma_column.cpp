@@ -217,8 +217,7 @@ void SigmaColumn::truncate_at(double tolerance) {
 bool SigmaColumn::wants_whole_kernel(double tolerance, double noise_rmse) {
     if (problem_.rows() > most_rows_of_whole_kernel || has_features_for(tolerance)) return false;
     const double widest = smoothings_on_noise(rough_.has_all_rows(), noise_rmse).front();
-    return !factorisation().is_likely_within(features_worth_having(problem_.rows(), widest, noise_rmse),
-                                             tolerance);
+    return !factorisation().is_within(features_worth_having(problem_.rows(), widest, noise_rmse), tolerance);
 }
 
 /// From where the fold was roughly; where rows were left out there, the others from the first.

@@ -34,16 +34,13 @@ class KernelFactorisation {
     KernelFactorisation(KernelFactorisation&&) = default;
 
     KernelFeatures features(double tolerance);
-    /// Whether that many features at most keep to the tolerance. Yes is sure; no may be a guess from the
-    /// first of them, which saves making the others.
-    bool is_likely_within(std::size_t most_features, double tolerance);
+    /// Whether that many features at most keep to the tolerance; stops where they do not.
+    bool is_within(std::size_t most_features, double tolerance);
     std::size_t kept_numbers() const { return features_.size() * rows_; }
 
   private:
     void extend_to(double tolerance, std::size_t most_features);
     void add_pivot(std::size_t pivot);
-    double left_over_behind(std::size_t features) const;
-    double expected_left_over(std::size_t count, std::size_t most) const;
 
     const LagProblem* problem_;
     double sigma_;
