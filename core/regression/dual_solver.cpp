@@ -126,28 +126,31 @@ void DualSolver::newton_direction() {
     if (bending_.empty()) {
         bias_direction_ = -bias_gradient / (1e-3 * curvature);
     } else {
-        auto& [system, factor, at_bending, of_bias, of_bending] = *workspace_;
-        pick_bending(system);
-        for (std::size_t i = 0; i < system.padded_rows(); ++i) system.at(i, i) += 1.0 / curvature;
-        factor.factor(system);
-        const auto bends = static_cast<Index>(bending_.size());
-        const auto padded = static_cast<Index>(system.padded_rows());
-        at_bending.setZero(padded);
-        for (Index b = 0; b < bends; ++b) {
-            at_bending(b) = -of_kernel_(bending_[static_cast<std::size_t>(b)]);
-        }
-        factor.solve_lower(at_bending.data());
-        of_bias.setZero(padded);
-        of_bias.head(bends).setOnes();
-        factor.solve_lower(of_bias.data());
-        bias_direction_ = (of_bias.dot(at_bending) - bias_gradient) / of_bias.squaredNorm();
-        at_bending -= bias_direction_ * of_bias;
-        factor.solve_upper(at_bending.data());
-        of_bending.assign(at_bending.data(), at_bending.data() + bends);
-        for (std::size_t b = 0; b < bending_.size(); ++b) direction_(bending_[b]) += of_bending[b];
-        add_kernel_columns(bending_, of_bending);
+        step_where_bending(curvature, bias_gradient, *workspace_);
     }
     change_ = (of_kernel_.array() + bias_direction_) * is_trained_.array();
+}
+
+void DualSolver::step_where_bending(double curvature, double bias_gradient, Workspace& work) {
+    pick_bending(work.system);
+    for (std::size_t i = 0; i < work.system.padded_rows(); ++i) work.system.at(i, i) += 1.0 / curvature;
+    work.factor.factor(work.system);
+    const auto bends = static_cast<Index>(bending_.size());
+    const auto padded = static_cast<Index>(work.system.padded_rows());
+    work.at_bending.setZero(padded);
+    for (Index b = 0; b < bends; ++b) {
+        work.at_bending(b) = -of_kernel_(bending_[static_cast<std::size_t>(b)]);
+    }
+    work.factor.solve_lower(work.at_bending.data());
+    work.of_bias.setZero(padded);
+    work.of_bias.head(bends).setOnes();
+    work.factor.solve_lower(work.of_bias.data());
+    bias_direction_ = (work.of_bias.dot(work.at_bending) - bias_gradient) / work.of_bias.squaredNorm();
+    work.at_bending -= bias_direction_ * work.of_bias;
+    work.factor.solve_upper(work.at_bending.data());
+    work.of_bending.assign(work.at_bending.data(), work.at_bending.data() + bends);
+    for (std::size_t b = 0; b < bending_.size(); ++b) direction_(bending_[b]) += work.of_bending[b];
+    add_kernel_columns(bending_, work.of_bending);
 }
 
 void DualSolver::pick_bending(PanelMatrix& system) const {

@@ -51,6 +51,7 @@ class DualSolver {
     bool descend(double smoothing, double still, int most_steps);
     void take_slopes();
     void newton_direction();
+    void step_where_bending(double curvature, double bias_gradient, Workspace& work);
     void pick_bending(PanelMatrix& system) const;
     double step_length() const;
     void centre_undetermined_bias();
