@@ -40,6 +40,8 @@ constexpr TubeSolver::Schedule wide{
 constexpr TubeSolver::Schedule exact{
     .first_smoothing = 1e-3, .factor = 0.1, .last_smoothing = 1e-8, .most_steps = 1000};
 constexpr double wide_tolerance_factor = 1000.0;
+/// Noise alone has a feature a row: all of them would make the start as dear as the fit.
+constexpr std::size_t rows_a_wide_feature = 3;
 constexpr double exact_tolerance_factor = 0.01;
 /// By more than this no prediction of the last fit is moved by the truncation of its kernel. A free run makes
 /// some hundred times that of it.
@@ -67,8 +69,9 @@ std::vector<Eigen::Index> all_rows(const VectorXd& targets) {
 /// wherever one comes.
 TubeSolver::State near_the_optimum(const KernelFeatures& kernel, const VectorXd& targets, double C,
                                    double sigma, double epsilon) {
-    const auto few = static_cast<Eigen::Index>(
-        vector_loops::padded(kernel.rank_at(wide_tolerance_factor * feature_tolerance(sigma))));
+    const std::size_t within = kernel.rank_at(wide_tolerance_factor * feature_tolerance(sigma));
+    const std::size_t most = static_cast<std::size_t>(targets.size()) / rows_a_wide_feature + 1;
+    const auto few = static_cast<Eigen::Index>(vector_loops::padded(std::min(within, most)));
     const Eigen::MatrixXd first_features = kernel.by_row.topRows(few);
     NewtonSystem system(first_features);
     TubeSolver solver(system, all_rows(targets), targets, epsilon);
