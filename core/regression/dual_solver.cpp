@@ -1,7 +1,5 @@
 #include "regression/dual_solver.hpp"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
@@ -132,7 +130,8 @@ void DualSolver::newton_direction() {
 }
 
 void DualSolver::step_where_bending(double curvature, double bias_gradient, Workspace& work) {
-    pick_bending(work.system);
+    pick_lower(kernel_->by_row.data(), static_cast<std::size_t>(kernel_->by_row.rows()), bending_,
+               work.system);
     for (std::size_t i = 0; i < work.system.padded_rows(); ++i) work.system.at(i, i) += 1.0 / curvature;
     work.factor.factor(work.system);
     const auto bends = static_cast<Index>(bending_.size());
@@ -151,27 +150,6 @@ void DualSolver::step_where_bending(double curvature, double bias_gradient, Work
     work.of_bending.assign(work.at_bending.data(), work.at_bending.data() + bends);
     for (std::size_t b = 0; b < bending_.size(); ++b) direction_(bending_[b]) += work.of_bending[b];
     add_kernel_columns(bending_, work.of_bending);
-}
-
-void DualSolver::pick_bending(PanelMatrix& system) const {
-    constexpr std::size_t panel_height = PanelMatrix::height;
-    const std::size_t count = bending_.size();
-    system.resize_lower(count);
-    for (std::size_t p = 0; p < system.panels(); ++p) {
-        const std::size_t first = p * panel_height;
-        std::array<Index, panel_height> rows{};
-        for (std::size_t lane = 0; lane < panel_height; ++lane) {
-            rows[lane] = bending_[std::min(first + lane, count - 1)];
-        }
-        for (std::size_t j = 0; j < std::min(first + panel_height, count); ++j) {
-            const double* const column = kernel_->by_row.col(bending_[j]).data();
-            double* const eight = system.eight(p, j);
-            for (std::size_t lane = 0; lane < panel_height; ++lane) eight[lane] = column[rows[lane]];
-        }
-    }
-    for (std::size_t i = count; i < system.padded_rows(); ++i) {
-        for (std::size_t j = 0; j <= i; ++j) system.at(i, j) = 0.0;
-    }
 }
 
 double DualSolver::step_length() const {

@@ -1,7 +1,6 @@
 #include "regression/newton_system.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <numeric>
 #include <span>
@@ -72,13 +71,6 @@ void gather_rows(const MatrixXd& by_row, std::span<const Index> rows, PanelMatri
             const double* const features = by_row.col(rows[first + lane]).data();
             for (std::size_t f = 0; f < rank; ++f) panel[f * height + lane] = features[f];
         }
-    }
-}
-
-/// Zeros in the rows and columns from `count` on.
-void clear_padding(PanelMatrix& lower, std::size_t count) {
-    for (std::size_t i = count; i < lower.padded_rows(); ++i) {
-        for (std::size_t j = 0; j <= i; ++j) lower.at(i, j) = 0.0;
     }
 }
 
@@ -156,7 +148,7 @@ void RowGram::over(const MatrixXd& by_row, const std::vector<Index>& bending, Pa
     }
     if (of_all_.size() == 0 && is_all_cheaper_by_now(bending.size(), all)) multiply_all(by_row);
     if (of_all_.size() > 0) {
-        pick(bending, out);
+        pick_lower(of_all_.data(), all, bending, out);
     } else {
         multiply(by_row, bending, out);
     }
@@ -189,23 +181,6 @@ void RowGram::follow(const MatrixXd& by_row, const std::vector<Index>& bending) 
         bring_up_to_date(by_row, bending);
     }
     rows_ = bending;
-}
-
-void RowGram::pick(const std::vector<Index>& bending, PanelMatrix& out) const {
-    const std::size_t count = bending.size();
-    out.resize_lower(count);
-    for (std::size_t p = 0; p < out.panels(); ++p) {
-        const std::size_t first = p * height;
-        std::array<Index, height> rows{};
-        for (std::size_t lane = 0; lane < height; ++lane)
-            rows[lane] = bending[std::min(first + lane, count - 1)];
-        for (std::size_t j = 0; j < std::min(first + height, count); ++j) {
-            const double* const column = of_all_.col(bending[j]).data();
-            double* const eight = out.eight(p, j);
-            for (std::size_t lane = 0; lane < height; ++lane) eight[lane] = column[rows[lane]];
-        }
-    }
-    clear_padding(out, count);
 }
 
 void RowGram::multiply_all(const MatrixXd& by_row) {

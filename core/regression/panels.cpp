@@ -155,6 +155,27 @@ void PanelMatrix::set_zero_lower(std::size_t rows) {
     std::ranges::fill(elements_, 0.0);
 }
 
+void pick_lower(const double* symmetric, std::size_t stride, const std::vector<std::ptrdiff_t>& rows,
+                PanelMatrix& out) {
+    const std::size_t count = rows.size();
+    out.resize_lower(count);
+    for (std::size_t p = 0; p < out.panels(); ++p) {
+        const std::size_t first = p * height;
+        std::array<std::ptrdiff_t, height> of_lanes{};
+        for (std::size_t lane = 0; lane < height; ++lane) {
+            of_lanes[lane] = rows[std::min(first + lane, count - 1)];
+        }
+        for (std::size_t j = 0; j < std::min(first + height, count); ++j) {
+            const double* const column = symmetric + static_cast<std::size_t>(rows[j]) * stride;
+            double* const eight = out.eight(p, j);
+            for (std::size_t lane = 0; lane < height; ++lane) eight[lane] = column[of_lanes[lane]];
+        }
+    }
+    for (std::size_t i = count; i < out.padded_rows(); ++i) {
+        for (std::size_t j = 0; j <= i; ++j) out.at(i, j) = 0.0;
+    }
+}
+
 void add_products(const PanelMatrix& V, double sign, PanelMatrix& lower) {
     for (std::size_t p = 0; p < V.panels(); ++p) {
         for (std::size_t q = 0; q <= p; ++q) {

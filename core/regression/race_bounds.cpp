@@ -19,6 +19,8 @@ double lowest_rmse_at_first(double rmse, double smoothing) {
 
 namespace {
 
+constexpr std::size_t many_rows = 800;
+
 /// The first fold's error that alone makes the mean worse than the best.
 double losing_rmse(double best_mean_mse, std::size_t folds) {
     return std::sqrt(best_mean_mse * static_cast<double>(folds));
@@ -34,6 +36,12 @@ double hopeless_rmse(double best_mean_mse, std::size_t folds) {
     return 5.0 * losing_rmse(best_mean_mse, folds);
 }
 
+double truncation_share(std::size_t rows, double noise_in_epsilons) {
+    if (rows < many_rows) return 0.1;
+    const double strength = noise_in_epsilons / 8.0;
+    return std::clamp(strength * strength, 1.0, 32.0);
+}
+
 double truncation(double share, double rmse, double coefficient_sum, double finest) {
     const double enough = share * rmse / coefficient_sum;
     if (!(enough > finest)) return finest;
@@ -43,7 +51,7 @@ double truncation(double share, double rmse, double coefficient_sum, double fine
 std::size_t features_worth_having(std::size_t rows, double smoothing, double noise_rmse) {
     // Normally distributed residuals: 0.8 of the rows bend times the smoothing over their standard deviation.
     // Fewer features than half of few rows, or a quarter of many, are not slower (README.md).
-    const double never_too_many = rows < 800 ? 0.5 : 0.25;
+    const double never_too_many = rows < many_rows ? 0.5 : 0.25;
     const double share = std::clamp(1.2 * smoothing / noise_rmse, never_too_many, 1.0);
     return static_cast<std::size_t>(share * static_cast<double>(rows));
 }

@@ -16,6 +16,10 @@ double lowest_rmse_at_first(double rmse, double smoothing);
 double hopeless_rmse(double best_mean_mse, std::size_t folds);
 double worse_rmse(double best_mean_mse, std::size_t folds);
 
+/// Of the error to beat, what the truncation of a kernel may move a prediction by at the very most. Where the
+/// rows are many their parts of it cancel, and the better, the more of the window is noise (README.md).
+double truncation_share(std::size_t rows, double noise_in_epsilons);
+
 /// To where a kernel may be truncated when an error of `share` of `rmse` in the predictions does not matter:
 /// no prediction moves by more than the tolerance times the sum of |c|. In steps, so that an error a little
 /// smaller is no reason to begin anew; never below `finest`.

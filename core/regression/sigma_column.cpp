@@ -11,14 +11,6 @@ namespace thermbal {
 namespace {
 
 constexpr double fine_tolerance_factor = 10.0;
-/// Of the error to beat, what the truncation of a kernel may move a prediction by at the very most. Where the
-/// rows are many their parts of it cancel, and the better, the more of the window is noise (README.md).
-double truncation_share(std::size_t rows, double noise_in_epsilons) {
-    if (rows < 800) return 0.1;
-    const double strength = noise_in_epsilons / 8.0;
-    return std::clamp(strength * strength, 1.0, 32.0);
-}
-
 /// 32 MB.
 constexpr std::size_t most_rows_of_whole_kernel = 2000;
 

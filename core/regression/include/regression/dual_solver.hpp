@@ -52,7 +52,6 @@ class DualSolver {
     void take_slopes();
     void newton_direction();
     void step_where_bending(double curvature, double bias_gradient, Workspace& work);
-    void pick_bending(PanelMatrix& system) const;
     double step_length() const;
     void centre_undetermined_bias();
     void add_kernel_columns(const std::vector<Eigen::Index>& rows, const std::vector<double>& factors);

@@ -48,7 +48,6 @@ class RowGram {
   private:
     bool is_all_cheaper_by_now(std::size_t bending, std::size_t all);
     void multiply(const Eigen::MatrixXd& by_row, const std::vector<Eigen::Index>& bending, PanelMatrix& out);
-    void pick(const std::vector<Eigen::Index>& bending, PanelMatrix& out) const;
     void follow(const Eigen::MatrixXd& by_row, const std::vector<Eigen::Index>& bending);
     void multiply_all(const Eigen::MatrixXd& by_row);
     void find_kept_and_fresh(const std::vector<Eigen::Index>& bending);

@@ -45,6 +45,11 @@ class PanelMatrix {
     std::vector<double> elements_;
 };
 
+/// The lower triangle of these rows and columns of a symmetric matrix (column-major, a column every `stride`
+/// numbers), zeros in the padding. REQUIRES: at least one row.
+void pick_lower(const double* symmetric, std::size_t stride, const std::vector<std::ptrdiff_t>& rows,
+                PanelMatrix& out);
+
 /// lower += sign * V V', its lower triangle. REQUIRES: lower square, of V's padded rows.
 void add_products(const PanelMatrix& V, double sign, PanelMatrix& lower);
 
