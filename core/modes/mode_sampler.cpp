@@ -1,118 +1,19 @@
 #include "mode_sampler.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
+#include "mode_likelihood.hpp"
 #include "random.hpp"
 
 namespace thermbal {
 
 namespace {
 
-constexpr std::size_t room_for_modes = 24;
-
-struct Cell {
-    Eigen::Index below = 0;
-    double share = 0.0;
-};
-
-Cell cell_of(double position, Eigen::Index points) {
-    const auto below = std::min(static_cast<Eigen::Index>(position), points - 2);
-    return {below, position - static_cast<double>(below)};
-}
-
-double interpolate(const Eigen::VectorXd& values, double position) {
-    const Cell cell = cell_of(position, values.size());
-    return (1.0 - cell.share) * values[cell.below] + cell.share * values[cell.below + 1];
-}
-
-double interpolate(const Eigen::MatrixXd& values, const Cell& row, const Cell& column) {
-    const double first = (1.0 - column.share) * values(row.below, column.below) +
-                         column.share * values(row.below, column.below + 1);
-    const double second = (1.0 - column.share) * values(row.below + 1, column.below) +
-                          column.share * values(row.below + 1, column.below + 1);
-    return (1.0 - row.share) * first + row.share * second;
-}
-
-/// Log marginal likelihood of all channels given the modes, up to a constant.
-double log_likelihood(const std::vector<WhitenedChannel>& channels, const ModePrior& prior,
-                      const std::vector<Mode>& modes) {
-    const std::size_t count = modes.size();
-    std::array<Cell, room_for_modes> cells;
-    std::array<double, room_for_modes> variance{};
-    std::array<double, room_for_modes> mean{};
-    double log_variances = 0.0;
-    const Eigen::Index points = channels.front().projected.size();
-    for (std::size_t k = 0; k < count; ++k) {
-        cells[k] = cell_of(modes[k].position, points);
-        const double share =
-            interpolate(prior.same_sign, modes[k].position) * std::abs(channels.front().direction);
-        variance[k] = std::exp(modes[k].log_variance) * (1.0 - share * share);
-        mean[k] = std::exp(0.5 * modes[k].log_variance) * share;
-        log_variances += std::log(variance[k]);
-    }
-    double total = 0.0;
-    std::array<std::array<double, room_for_modes>, room_for_modes> factor;
-    std::array<double, room_for_modes> expected{};
-    std::array<double, room_for_modes> projected{};
-    std::array<double, room_for_modes> solved{};
-    for (const WhitenedChannel& channel : channels) {
-        const double scale_squared = channel.scale * channel.scale;
-        const double signed_scale = channel.direction < 0.0 ? -channel.scale : channel.scale;
-        double determinant = 1.0;  // of a few pivots at a time, so that they share a logarithm
-        double log_determinant = 0.0;
-        double fitted = 0.0;
-        for (std::size_t row = 0; row < count; ++row) {
-            const Cell& cell = cells[row];
-            projected[row] = (1.0 - cell.share) * channel.projected[cell.below] +
-                             cell.share * channel.projected[cell.below + 1];
-            expected[row] = signed_scale * mean[row];
-        }
-        // Of the data less what the means explain: their own misfit here, the modes' gain below.
-        std::array<double, room_for_modes> left = projected;
-        for (std::size_t row = 0; row < count; ++row) {
-            for (std::size_t column = 0; column <= row; ++column) {
-                factor[row][column] = interpolate(channel.gram, cells[row], cells[column]);
-                left[row] -= factor[row][column] * expected[column];
-                if (column < row) left[column] -= factor[row][column] * expected[row];
-            }
-        }
-        double of_mean = 0.0;
-        for (std::size_t row = 0; row < count; ++row) of_mean += expected[row] * (projected[row] + left[row]);
-        for (std::size_t row = 0; row < count; ++row) {
-            for (std::size_t column = 0; column <= row; ++column) {
-                double value = factor[row][column];
-                if (row == column) value += 1.0 / (scale_squared * variance[row]);
-                for (std::size_t k = 0; k < column; ++k) value -= factor[row][k] * factor[column][k];
-                if (row == column) {
-                    value = std::max(value, 1e-12);
-                    determinant *= value;
-                    if (determinant > 1e200 || determinant < 1e-200) {
-                        log_determinant += std::log(determinant);
-                        determinant = 1.0;
-                    }
-                    factor[row][row] = std::sqrt(value);
-                } else {
-                    factor[row][column] = value / factor[column][column];
-                }
-            }
-            double value = left[row];
-            for (std::size_t k = 0; k < row; ++k) value -= factor[row][k] * solved[k];
-            solved[row] = value / factor[row][row];
-            fitted += solved[row] * solved[row];
-        }
-        log_determinant += std::log(determinant);
-        total += 0.5 * (of_mean + fitted - log_determinant - log_variances -
-                        static_cast<double>(count) * std::log(scale_squared));
-    }
-    return total;
-}
-
 class Chain {
   public:
     Chain(const std::vector<WhitenedChannel>& channels, const ModePrior& prior, std::uint64_t seed)
-        : channels_(channels),
+        : likelihood_(channels, prior),
           prior_(prior),
           random_(seed),
           last_(static_cast<double>(prior.intensity.size() - 1)) {
@@ -121,12 +22,12 @@ class Chain {
             expected_ += 0.5 * (prior.intensity[g] + prior.intensity[g + 1]);
             cumulative_.push_back(expected_);
         }
-        most_ = std::min(prior.most_modes, room_for_modes);
+        most_ = std::min(prior.most_modes, ModeLikelihood::most_modes);
         for (std::size_t k = 0; k < 5; ++k) {
             const double share = (static_cast<double>(k) + 0.5) / 5.0;
             modes_.push_back({share * 0.8 * last_, -1.0});
         }
-        log_likelihood_ = log_likelihood(channels_, prior_, modes_);
+        log_likelihood_ = likelihood_.log_at(modes_);
     }
 
     void sweep(double temperature) {
@@ -156,7 +57,7 @@ class Chain {
 
     /// Density of draw_position is piecewise constant: that of the cell.
     double log_intensity(double position) const {
-        const Cell cell = cell_of(position, prior_.intensity.size());
+        const GridCell cell = cell_of(position, prior_.intensity.size());
         return std::log(0.5 * (prior_.intensity[cell.below] + prior_.intensity[cell.below + 1]));
     }
 
@@ -175,7 +76,7 @@ class Chain {
     }
 
     bool accept(std::vector<Mode>& proposed, double log_prior_ratio) {
-        const double likelihood = log_likelihood(channels_, prior_, proposed);
+        const double likelihood = likelihood_.log_at(proposed);
         const double log_ratio = (likelihood - log_likelihood_) / temperature_ + log_prior_ratio;
         if (!(std::log(random_.uniform()) < log_ratio)) return false;
         modes_.swap(proposed);
@@ -244,7 +145,7 @@ class Chain {
                         static_cast<std::size_t>(random_.uniform() * static_cast<double>(modes_.size())));
     }
 
-    const std::vector<WhitenedChannel>& channels_;
+    ModeLikelihood likelihood_;
     const ModePrior& prior_;
     Random random_;
     double last_;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "regression/every_width.hpp"
+#include "base/every_width.hpp"
 
 namespace thermbal {
 namespace {

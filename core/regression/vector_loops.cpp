@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "regression/every_width.hpp"
+#include "base/every_width.hpp"
 
 namespace thermbal::vector_loops {
 namespace {
