@@ -33,6 +33,7 @@ std::vector<Measured> measured_channels(std::size_t count) {
 
 std::vector<WhitenedChannel> whitened(const std::vector<Measured>& channels, double direction) {
     std::vector<WhitenedChannel> all;
+    all.reserve(channels.size());
     for (const Measured& channel : channels) {
         all.push_back({channel.columns.transpose() * channel.columns,
                        channel.columns.transpose() * channel.data, channel.scale, direction});
@@ -101,9 +102,8 @@ TEST(ModeLikelihood, IsTheDensityOfTheDataFromNoModeToTheMost) {
 TEST(ModeLikelihood, AWideRangeOfPivotsOverflowsNothing) {
     std::vector<Measured> channels = measured_channels(3);
     for (Measured& channel : channels) channel.columns = 1e20 * Eigen::MatrixXd::Identity(rows, points);
-    std::vector<Mode> modes;
-    for (Eigen::Index k = 0; k < points; ++k) modes.push_back({static_cast<double>(k), 45.0});
-    modes.resize(points - 1);
+    std::vector<Mode> modes(points - 1);
+    for (std::size_t k = 0; k < modes.size(); ++k) modes[k] = {static_cast<double>(k), 45.0};
     const ModePrior prior = prior_of_signs();
     const double found = ModeLikelihood(whitened(channels, 0.0), prior).log_at(modes);
     const double expected = by_density(channels, modes, 0.0);
