@@ -39,10 +39,10 @@ double mixture_quantile(const ChannelDraws& draws, double probability) {
 void add_on_grid(const std::vector<Mode>& modes, const Eigen::VectorXd& value, double factor,
                  Eigen::VectorXd& grid) {
     for (std::size_t k = 0; k < modes.size(); ++k) {
-        const auto below = std::min(static_cast<Eigen::Index>(modes[k].position), grid.size() - 2);
-        const double share = modes[k].position - static_cast<double>(below);
-        grid[below] += factor * (1.0 - share) * value[static_cast<Eigen::Index>(k)];
-        grid[below + 1] += factor * share * value[static_cast<Eigen::Index>(k)];
+        const GridCell cell = cell_of(modes[k].position, grid.size());
+        const auto index = static_cast<Eigen::Index>(k);
+        grid[cell.below] += factor * (1.0 - cell.share) * value[index];
+        grid[cell.below + 1] += factor * cell.share * value[index];
     }
 }
 

@@ -76,10 +76,9 @@ WhitenedChannel ChannelModel::whitened(double direction) const {
 Eigen::MatrixXd ChannelModel::columns_at(const std::vector<Mode>& modes) const {
     Eigen::MatrixXd columns(fine_.rows(), static_cast<Eigen::Index>(modes.size()));
     for (std::size_t k = 0; k < modes.size(); ++k) {
-        const auto below = std::min(static_cast<Eigen::Index>(modes[k].position), fine_.cols() - 2);
-        const double share = modes[k].position - static_cast<double>(below);
+        const GridCell cell = cell_of(modes[k].position, fine_.cols());
         columns.col(static_cast<Eigen::Index>(k)) =
-            (1.0 - share) * fine_.col(below) + share * fine_.col(below + 1);
+            (1.0 - cell.share) * fine_.col(cell.below) + cell.share * fine_.col(cell.below + 1);
     }
     return columns;
 }

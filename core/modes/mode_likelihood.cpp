@@ -11,7 +11,7 @@ namespace thermbal {
 
 namespace {
 
-constexpr std::size_t lanes = ModeLikelihood::lanes;
+constexpr std::size_t lanes = ChannelGroup::lanes;
 constexpr std::size_t room_for_modes = ModeLikelihood::most_modes;
 
 /// One number a channel, as many at a time as the widest registers hold.
@@ -34,15 +34,6 @@ struct ModeTerms {
     std::array<double, room_for_modes> mean{};      ///< relative to its scale
 };
 
-/// Of the channels of a group, in the order of their lanes.
-struct ChannelTerms {
-    const double* gram = nullptr;
-    const double* projected = nullptr;
-    const double* scale_squared = nullptr;
-    const double* signed_scale = nullptr;
-    std::size_t points = 0;
-};
-
 struct Sums {
     std::array<double, lanes> of_mean{};
     std::array<double, lanes> fitted{};
@@ -61,21 +52,20 @@ void take_logarithms(std::array<double, lanes>& determinant, std::array<double, 
 /// With the columns U and the data z of a channel whitened, A the variances of the modes' amplitudes and m
 /// their means: L L' = U'U + A^-1 gives log |I + U A U'| and the quadratic form by Woodbury's identity.
 THERMBAL_EVERY_WIDTH
-void add_up(const ModeTerms& modes, const ChannelTerms& channels, Sums& sums) {
+void add_up(const ModeTerms& modes, const ChannelGroup& channels, Sums& sums) {
     const std::size_t count = modes.count;
     std::array<std::array<EachChannel, room_for_modes>, room_for_modes> factor;
     std::array<EachChannel, room_for_modes> expected;
     std::array<EachChannel, room_for_modes> projected;
     std::array<EachChannel, room_for_modes> solved;
-    const EachChannel signed_scale = load(channels.signed_scale);
-    const EachChannel scale_squared = load(channels.scale_squared);
+    const EachChannel scale = load(channels.scale.data());
     for (std::size_t row = 0; row < count; ++row) {
         const double share = modes.share[row];
-        const EachChannel at_below = load(channels.projected + modes.below[row] * lanes);
-        const EachChannel at_next = load(channels.projected + (modes.below[row] + 1) * lanes);
+        const EachChannel at_below = load(channels.projected.data() + modes.below[row] * lanes);
+        const EachChannel at_next = load(channels.projected.data() + (modes.below[row] + 1) * lanes);
         for (std::size_t e = 0; e < eights; ++e) {
             projected[row][e] = (1.0 - share) * at_below[e] + share * at_next[e];
-            expected[row][e] = signed_scale[e] * modes.mean[row];
+            expected[row][e] = scale[e] * modes.mean[row];
         }
     }
     // Of the data less what the means explain: their own misfit here, the modes' gain below.
@@ -85,7 +75,7 @@ void add_up(const ModeTerms& modes, const ChannelTerms& channels, Sums& sums) {
             const double of_row = modes.share[row];
             const double of_column = modes.share[column];
             const double* const corner =
-                channels.gram + (modes.below[row] * channels.points + modes.below[column]) * lanes;
+                channels.gram.data() + (modes.below[row] * channels.points + modes.below[column]) * lanes;
             const EachChannel first_below = load(corner);
             const EachChannel first_next = load(corner + lanes);
             const EachChannel second_below = load(corner + channels.points * lanes);
@@ -121,7 +111,8 @@ void add_up(const ModeTerms& modes, const ChannelTerms& channels, Sums& sums) {
         }
         EachChannel pivot = factor[row][row];
         EachChannel value = left[row];
-        for (std::size_t e = 0; e < eights; ++e) pivot[e] += 1.0 / (scale_squared[e] * modes.variance[row]);
+        for (std::size_t e = 0; e < eights; ++e)
+            pivot[e] += 1.0 / (scale[e] * scale[e] * modes.variance[row]);
         for (std::size_t k = 0; k < row; ++k) {
             for (std::size_t e = 0; e < eights; ++e) {
                 pivot[e] -= factor[row][k][e] * factor[row][k][e];
@@ -150,16 +141,6 @@ void add_up(const ModeTerms& modes, const ChannelTerms& channels, Sums& sums) {
 
 }  // namespace
 
-GridCell cell_of(double position, Eigen::Index points) {
-    const auto below = std::min(static_cast<Eigen::Index>(position), points - 2);
-    return {below, position - static_cast<double>(below)};
-}
-
-double interpolate(const Eigen::VectorXd& values, double position) {
-    const GridCell cell = cell_of(position, values.size());
-    return (1.0 - cell.share) * values[cell.below] + cell.share * values[cell.below + 1];
-}
-
 ModeLikelihood::ModeLikelihood(const std::vector<WhitenedChannel>& channels, const ModePrior& prior)
     : prior_(prior),
       points_(static_cast<std::size_t>(channels.front().projected.size())),
@@ -167,12 +148,12 @@ ModeLikelihood::ModeLikelihood(const std::vector<WhitenedChannel>& channels, con
     for (std::size_t k = 0; k < channels.size(); ++k) {
         const std::size_t lane = k % lanes;
         if (lane == 0) {
-            groups_.push_back({0, std::vector<double>(points_ * points_ * lanes, 0.0),
+            groups_.push_back({0, points_, std::vector<double>(points_ * points_ * lanes, 0.0),
                                std::vector<double>(points_ * lanes, 0.0), std::vector<double>(lanes, 1.0),
-                               std::vector<double>(lanes, 0.0), std::vector<double>(lanes, 0.0)});
+                               std::vector<double>(lanes, 0.0)});
         }
         const WhitenedChannel& channel = channels[k];
-        Group& group = groups_.back();
+        ChannelGroup& group = groups_.back();
         ++group.channels;
         for (std::size_t row = 0; row < points_; ++row) {
             const auto i = static_cast<Eigen::Index>(row);
@@ -182,13 +163,13 @@ ModeLikelihood::ModeLikelihood(const std::vector<WhitenedChannel>& channels, con
                     channel.gram(i, static_cast<Eigen::Index>(column));
             }
         }
-        group.scale_squared[lane] = channel.scale * channel.scale;
-        group.signed_scale[lane] = channel.direction < 0.0 ? -channel.scale : channel.scale;
+        group.scale[lane] = channel.scale;
         group.log_scale_squared[lane] = std::log(channel.scale * channel.scale);
     }
 }
 
 double ModeLikelihood::log_at(const std::vector<Mode>& modes) const {
+    const ModeAmplitudes amplitudes = relative_amplitudes(modes, prior_, direction_);
     ModeTerms terms;
     terms.count = modes.size();
     double log_variances = 0.0;
@@ -196,18 +177,15 @@ double ModeLikelihood::log_at(const std::vector<Mode>& modes) const {
         const GridCell cell = cell_of(modes[k].position, static_cast<Eigen::Index>(points_));
         terms.below[k] = static_cast<std::size_t>(cell.below);
         terms.share[k] = cell.share;
-        const double same_sign = interpolate(prior_.same_sign, modes[k].position) * std::abs(direction_);
-        terms.variance[k] = std::exp(modes[k].log_variance) * (1.0 - same_sign * same_sign);
-        terms.mean[k] = std::exp(0.5 * modes[k].log_variance) * same_sign;
+        const auto index = static_cast<Eigen::Index>(k);
+        terms.variance[k] = amplitudes.variance[index];
+        terms.mean[k] = amplitudes.mean[index];
         log_variances += std::log(terms.variance[k]);
     }
     double total = 0.0;
-    for (const Group& group : groups_) {
+    for (const ChannelGroup& group : groups_) {
         Sums sums;
-        add_up(terms,
-               {group.gram.data(), group.projected.data(), group.scale_squared.data(),
-                group.signed_scale.data(), points_},
-               sums);
+        add_up(terms, group, sums);
         for (std::size_t lane = 0; lane < group.channels; ++lane) {
             total +=
                 0.5 * (sums.of_mean[lane] + sums.fitted[lane] - sums.log_determinant[lane] - log_variances -

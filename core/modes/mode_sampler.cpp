@@ -160,19 +160,6 @@ class Chain {
 
 }  // namespace
 
-ModeAmplitudes relative_amplitudes(const std::vector<Mode>& modes, const ModePrior& prior, double direction) {
-    ModeAmplitudes amplitudes;
-    amplitudes.variance.resize(static_cast<Eigen::Index>(modes.size()));
-    amplitudes.mean.resize(static_cast<Eigen::Index>(modes.size()));
-    for (std::size_t k = 0; k < modes.size(); ++k) {
-        const auto index = static_cast<Eigen::Index>(k);
-        const double share = interpolate(prior.same_sign, modes[k].position) * std::abs(direction);
-        amplitudes.variance[index] = std::exp(modes[k].log_variance) * (1.0 - share * share);
-        amplitudes.mean[index] = std::exp(0.5 * modes[k].log_variance) * std::copysign(share, direction);
-    }
-    return amplitudes;
-}
-
 std::vector<std::vector<Mode>> sample_modes(const std::vector<WhitenedChannel>& channels,
                                             const ModePrior& prior, std::size_t burn_in, std::size_t kept,
                                             std::size_t thinning, std::uint64_t seed) {
