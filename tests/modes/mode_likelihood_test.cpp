@@ -50,7 +50,16 @@ ModePrior prior_of_signs() {
 /// The logarithm of the density of the data, less that of the data without any mode: the dense normal
 /// distribution itself, its covariance written out.
 double by_density(const std::vector<Measured>& channels, const std::vector<Mode>& modes, double direction) {
-    const ModeAmplitudes amplitudes = relative_amplitudes(modes, prior_of_signs(), direction);
+    // Not relative_amplitudes, which the likelihood calls: LinSpaced(0, 0.7) in closed form.
+    const auto count = static_cast<Eigen::Index>(modes.size());
+    Eigen::VectorXd variance(count);
+    Eigen::VectorXd mean(count);
+    for (Eigen::Index k = 0; k < count; ++k) {
+        const Mode& mode = modes[static_cast<std::size_t>(k)];
+        const double share = 0.7 * mode.position / (points - 1) * direction;
+        mean[k] = std::exp(0.5 * mode.log_variance) * share;
+        variance[k] = std::exp(mode.log_variance) - mean[k] * mean[k];
+    }
     double total = 0.0;
     for (const Measured& channel : channels) {
         Eigen::MatrixXd at_modes(rows, static_cast<Eigen::Index>(modes.size()));
@@ -60,10 +69,10 @@ double by_density(const std::vector<Measured>& channels, const std::vector<Mode>
             at_modes.col(static_cast<Eigen::Index>(k)) =
                 (1.0 - share) * channel.columns.col(below) + share * channel.columns.col(below + 1);
         }
-        const Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(rows, rows) +
-                                           channel.scale * channel.scale * at_modes *
-                                               amplitudes.variance.asDiagonal() * at_modes.transpose();
-        const Eigen::VectorXd away = channel.data - channel.scale * at_modes * amplitudes.mean;
+        const Eigen::MatrixXd covariance =
+            Eigen::MatrixXd::Identity(rows, rows) +
+            channel.scale * channel.scale * at_modes * variance.asDiagonal() * at_modes.transpose();
+        const Eigen::VectorXd away = channel.data - channel.scale * at_modes * mean;
         const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
         total += 0.5 * (channel.data.squaredNorm() - away.dot(factor.solve(away)) -
                         factor.vectorD().array().log().sum());
