@@ -21,6 +21,11 @@ inline double total(const Lanes& sums) {
     return ((sums[0] + sums[4]) + (sums[1] + sums[5])) + ((sums[2] + sums[6]) + (sums[3] + sums[7]));
 }
 
+/// By reference: a vector that is returned would be passed in another way at every width.
+[[gnu::always_inline]] inline void load(const double* from, Vector& vector) {
+    std::memcpy(&vector, from, sizeof vector);
+}
+
 /// 2^k e^f with k = round(x / ln 2), |f| <= ln 2 / 2, e^f by its Taylor polynomial of degree 12.
 [[gnu::always_inline]] inline double exp_of(double x) {
     constexpr double log2_e = 1.4426950408889634;
@@ -59,11 +64,10 @@ void multiply_rows(const double* __restrict matrix, std::size_t length, std::spa
         std::array<Vector, 4> sums{};
         for (std::size_t k = 0; k < length; k += lanes) {
             Vector of_factor;
-            std::memcpy(&of_factor, factor + k, sizeof of_factor);
+            load(factor + k, of_factor);
             for (std::size_t r = 0; r < 4; ++r) {
                 Vector of_row;
-                std::memcpy(&of_row, matrix + static_cast<std::size_t>(rows[i + r]) * length + k,
-                            sizeof of_row);
+                load(matrix + static_cast<std::size_t>(rows[i + r]) * length + k, of_row);
                 sums[r] += of_factor * of_row;
             }
         }
@@ -122,13 +126,28 @@ void subtract_columns(const double* const* matrix, std::size_t rows, std::size_t
 THERMBAL_EVERY_WIDTH
 void squared_distances_to(const double* const* lagged, std::size_t rows, const double* __restrict point,
                           std::size_t lags, double* __restrict distance) {
-    for (std::size_t i = 0; i < rows; ++i) distance[i] = 0.0;
+    // Four vectors at a time stay in registers over all lags.
+    std::size_t i = 0;
+    for (; i + 4 * lanes <= rows; i += 4 * lanes) {
+        std::array<Vector, 4> sums{};
+        for (std::size_t l = 0; l < lags; ++l) {
+            const double at = point[l];
+            for (std::size_t v = 0; v < 4; ++v) {
+                Vector difference;
+                load(lagged[l] + i + v * lanes, difference);
+                difference -= at;
+                sums[v] += difference * difference;
+            }
+        }
+        std::memcpy(distance + i, sums.data(), sizeof sums);
+    }
+    for (std::size_t k = i; k < rows; ++k) distance[k] = 0.0;
     for (std::size_t l = 0; l < lags; ++l) {
         const double at = point[l];
         const double* column = lagged[l];
-        for (std::size_t i = 0; i < rows; ++i) {
-            const double difference = column[i] - at;
-            distance[i] += difference * difference;
+        for (std::size_t k = i; k < rows; ++k) {
+            const double difference = column[k] - at;
+            distance[k] += difference * difference;
         }
     }
 }
@@ -153,18 +172,35 @@ double weighted_gaussians(const double* __restrict centres, std::size_t count,
                           const double* __restrict weight, const double* __restrict point, std::size_t lags,
                           double factor) {
     Lanes sums{};
-    for (std::size_t i = 0; i < count; i += lanes) {
-        Lanes distance{};
+    const auto add = [&](std::size_t i, const Vector& distance) __attribute__((always_inline)) {
+        const auto by_lane = std::bit_cast<Lanes>(distance);
+        for (std::size_t lane = 0; lane < lanes; ++lane) {
+            sums[lane] += weight[i + lane] * exp_of(std::max(factor * by_lane[lane], -700.0));
+        }
+    };
+    // Four at a time: one sum alone waits for itself.
+    std::size_t i = 0;
+    for (; i + 4 * lanes <= count; i += 4 * lanes) {
+        std::array<Vector, 4> distance{};
         for (std::size_t l = 0; l < lags; ++l) {
-            const double* centre = centres + l * count + i;
-            for (std::size_t lane = 0; lane < lanes; ++lane) {
-                const double difference = centre[lane] - point[l];
-                distance[lane] += difference * difference;
+            for (std::size_t v = 0; v < 4; ++v) {
+                Vector difference;
+                load(centres + l * count + i + v * lanes, difference);
+                difference -= point[l];
+                distance[v] += difference * difference;
             }
         }
-        for (std::size_t lane = 0; lane < lanes; ++lane) {
-            sums[lane] += weight[i + lane] * exp_of(std::max(factor * distance[lane], -700.0));
+        for (std::size_t v = 0; v < 4; ++v) add(i + v * lanes, distance[v]);
+    }
+    for (; i < count; i += lanes) {
+        Vector distance{};
+        for (std::size_t l = 0; l < lags; ++l) {
+            Vector difference;
+            load(centres + l * count + i, difference);
+            difference -= point[l];
+            distance += difference * difference;
         }
+        add(i, distance);
     }
     return total(sums);
 }
